@@ -27,6 +27,9 @@ LOG_ZOOM_SD, MOST_LOG_ZOOM = 0.3, math.log(4.0)
 FEWEST_INLIERS, FEWEST_CELLS = 8, 5
 LOG10_FALSE = -6.0  # of the number of false alarms (Moisan and Stival 2004)
 RIVAL = 0.6  # of the best consensus' score: a second one as large makes both no evidence
+# The rival may have more where what stands fills 28 of 96 cells: a lorry drives, walls do not
+RIVAL_OF_WIDE, WIDE_CELLS = 0.9, 28
+STANDING_CELLS = 0.2  # of a turn's cells that stand on the screen: masks and dirt fill fewer
 
 # Covariance
 ROBUST = 4.685  # Tukey's biweight: 95 % efficient at the normal distribution
@@ -38,8 +41,9 @@ FLOOR_RAD = math.radians(0.02)  # sd of each angle, of pictures of one pose at o
 FLOOR_LOG_ZOOM = 0.001
 LENS_SHARE = 0.01  # of the turn: by how much the focal length and the distortion may be wrong
 LENS_ACROSS = 0.2  # of that in the other directions
-SHIFTED_MORE = 0.3  # of the inliers more by a shifted camera than by a turned one
+SHIFTED_MORE = 0.2  # of the inliers more by a shifted camera than by a turned one
 SHIFTED_LEAST = 12  # more, at least: of a few, lines explain some by chance
+MOST_DISPARITY_RAD = math.radians(10.0)  # between near and far things
 SHIFTED_WIDER = 3.0  # times the standard deviations
 
 # Gallery

@@ -39,6 +39,10 @@ class Matches:
     def __len__(self) -> int:
         return len(self.cells)
 
+    def cells_of(self, chosen: Mask) -> int:
+        """How many cells some of the matches (M,) are in."""
+        return len(np.unique(self.cells[chosen]))
+
 
 def lens_of(intrinsics: Intrinsics, width: int, height: int) -> Intrinsics:
     """The lens of a picture of another size: scaled, and cut on the side that is too long for it.

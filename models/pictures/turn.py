@@ -92,18 +92,22 @@ def turn_between(reference: Features, now: Features, intrinsics: Intrinsics) -> 
     best = find(matches, allowed)
     if best is None or not _is_evidence(matches, best):
         return None
-    rival = find(matches, allowed & ~best.agree)
+    standing = bool((best.agree & matches.still).sum() > 0.5 * best.agree.sum())
+    if not standing and _stands_too(matches, best):
+        return None
     near = False
-    if rival is not None and rival.score > config.RIVAL * best.score and rival.log10_false < 0:
-        near = _apart_px(matches, best, rival) < 3 * matches.tolerance_px
-        if not near:
-            return None
-    if (best.agree & matches.still).sum() > 0.5 * best.agree.sum():
-        best = consensus_at(matches, np.ones(len(matches), bool), best.rotation, best.log_zoom)
-    else:
-        best = consensus_at(matches, ~matches.still, best.rotation, best.log_zoom)
-        if not _is_evidence(matches, best):
-            return None
+    rival = find(matches, allowed & ~best.agree)
+    if rival is not None and rival.log10_false < 0:
+        wide = standing and matches.cells_of(best.agree) >= config.WIDE_CELLS
+        if rival.score > (config.RIVAL_OF_WIDE if wide else config.RIVAL) * best.score:
+            near = _apart_px(matches, best, rival) < 3 * matches.tolerance_px
+            if not near:
+                return None
+    # Where the rest stands, so may the clock; where it turned, the screen tells nothing.
+    among = np.ones(len(matches), bool) if standing else ~matches.still
+    best = consensus_at(matches, among, best.rotation, best.log_zoom)
+    if not _is_evidence(matches, best):
+        return None
     return _refined(matches, best, reference, now, intrinsics, shifted=near)
 
 
@@ -129,12 +133,21 @@ def turned_covariance(prior: CameraPose, turn: Turn) -> Array:
 
 
 def _is_evidence(matches: Matches, found: Consensus) -> bool:
-    cells = len(np.unique(matches.cells[found.agree]))
     return bool(
         found.agree.sum() >= config.FEWEST_INLIERS
-        and cells >= config.FEWEST_CELLS
+        and matches.cells_of(found.agree) >= config.FEWEST_CELLS
         and found.log10_false < config.LOG10_FALSE
     )
+
+
+def _stands_too(matches: Matches, found: Consensus) -> bool:
+    """True where much of the picture, and no clock, stands on the screen beside what turned.
+
+    A bus that fills the view has moved, more likely than that the camera has.
+    """
+    still = matches.cells_of(matches.still & ~matches.overlay & ~found.agree)
+    least = config.STANDING_CELLS * matches.cells_of(found.agree)
+    return still >= max(config.FEWEST_CELLS, least)
 
 
 def _apart_px(matches: Matches, one: Consensus, other: Consensus) -> float:
@@ -158,10 +171,13 @@ def _refined(
     length = np.linalg.norm(off, axis=-1)
     # Of a two-dimensional normal distribution the median distance is 1.177 sd.
     sigma = max(float(np.median(length[agree])) / 1.177, config.LEAST_SIGMA_PX / now.analysed)
-    shifted = shifted or _is_shifted(matches, agree)
+    standing = float(np.mean(matches.still[agree])) > 0.5
+    disparity = 0.0 if standing else _disparity_rad(matches, agree, length)
+    shifted = shifted or disparity > 0
     covariance = _covariance(matches, agree, rotation, log_zoom, sigma)
     if shifted:
         covariance = covariance * config.SHIFTED_WIDER**2
+        covariance[:3, :3] += disparity**2 * np.eye(3)
     vector = np.asarray(cv2.Rodrigues(rotation)[0], np.float64).ravel()
     return Turn(
         rotation=vector,
@@ -218,20 +234,26 @@ def _covariance(
     return np.asarray((share * clustered + (1 - share) * plain * sigma**2) * wider)
 
 
-def _is_shifted(matches: Matches, agree: Mask) -> bool:
-    """True where many more matches keep to lines towards one point than agree on a turn."""
+def _disparity_rad(matches: Matches, agree: Mask, length_px: Array) -> float:
+    """By how much near and far things turned differently, usually; 0 where all turned alike.
+
+    Then many more matches keep to lines towards one point than agree on a turn.
+    """
     clear = ~matches.overlay
     least = max(config.SHIFTED_MORE * agree.sum(), config.SHIFTED_LEAST)
     if (clear & ~agree).sum() <= least:
-        return False
+        return 0.0
     reach = matches.tolerance_px / 3 / matches.focal_px
     _, mask = cv2.findEssentialMat(
         matches.reference[clear, :2], matches.now[clear, :2], np.eye(3), cv2.RANSAC, 0.999, reach
     )
     if mask is None:
-        return False
-    more = (mask[:, 0] > 0).sum() - agree.sum()
-    return bool(more > least)
+        return 0.0
+    lined = mask[:, 0] > 0
+    if lined.sum() - agree.sum() <= least:
+        return 0.0
+    off = np.nan_to_num(length_px[clear][lined], nan=math.inf)
+    return min(float(np.median(off)) / matches.focal_px, config.MOST_DISPARITY_RAD)
 
 
 def _shared(

@@ -1,15 +1,20 @@
 """How well two pictures tell a camera's turn: photographs, a real camera that moved, and the cost.
 
-`python -m studies pictures FOLDER ...`: photographs are turned by what is known, in all weathers;
-pictures of one pose are compared with one another. With `--before` and `--after`, pictures of a
-real camera that moved; with `--cost`, the CPU time of a comparison alone.
+`python -m studies pictures FOLDER ...`: photographs are turned by what is known, in all weathers,
+and pictures of one pose are compared with one another; trials that `--output` has are not made
+again. With `--before` and `--after`, pictures of a real camera that moved; with `--cost`, the CPU
+time of a comparison alone.
 """
 
 import argparse
+import math
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
+from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,11 +23,13 @@ from rich.console import Console
 from models.pictures.features import Features, describe
 from models.pictures.measures import Pixels
 from models.pictures.turn import Turn, turn_between
+from studies.lines_file import LinesFile
 from studies.pages import markers, write_between
 from studies.pictures.tables import cost_line, pairs_table, real_table, turns_table
 from studies.pictures.trials import (
     PairTrial,
     TurnTrial,
+    elsewhere,
     pair_trials,
     photographs,
     still_pictures,
@@ -32,8 +39,10 @@ from studies.pictures.weather import lens
 from studies.runs import as_they_end, process_pool
 
 COMMAND = "python -m studies pictures"
-_AT_ONCE = 25  # trials of a task
-_SHARED = 0.5  # of the old view in sight
+_AT_ONCE = 10  # trials of a task
+STILL = 20  # pictures of one pose that are compared with one another
+STRANGERS = 5  # pictures of other places
+PAIRS_OF_A_ROUND = STILL * (STILL - 1) // 2
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -42,7 +51,7 @@ def main(arguments: Sequence[str]) -> None:
     cv2.setNumThreads(1)
     parts = []
     if asked.folders and not asked.cost:
-        parts += [turns_table(_turns(asked)), pairs_table(*_pairs(asked))]
+        parts += _of_photographs(asked)
     if asked.before and asked.after:
         parts.append(real_table(*_real(asked.before, asked.after, asked.focal_px)))
     if asked.folders:
@@ -57,64 +66,74 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=COMMAND, description=__doc__)
     parser.add_argument("folders", nargs="*", type=Path, help="of photographs")
     parser.add_argument("--turns", type=int, default=500, help="trials of a known turn")
-    parser.add_argument("--still", type=int, default=40, help="pictures of each pose")
-    parser.add_argument("--pairs", type=int, default=10_000, help="of one pose, at most")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--pairs", type=int, default=10_000, help="of one pose, at least")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--before", nargs="*", type=Path, help="pictures of a real camera")
     parser.add_argument("--after", nargs="*", type=Path, help="and of it after it moved")
     parser.add_argument("--focal-px", type=float, default=lens().fx, help="of that camera")
     parser.add_argument("--cost", action="store_true", help="the CPU time alone")
+    parser.add_argument("--output", type=Path, default=Path("pictures.jsonl"), help="kept trials")
     parser.add_argument("--write", type=Path, help="a page with markers for the tables")
     return parser
 
 
-def _turns(asked: argparse.Namespace) -> list[TurnTrial]:
-    seeds = [
-        range(asked.seed + first, asked.seed + min(first + _AT_ONCE, asked.turns))
-        for first in range(0, asked.turns, _AT_ONCE)
-    ]
-    tasks = [partial(_some_turns, asked.folders, each) for each in seeds]
-    with process_pool(asked.processes) as pool:
-        return [trial for _, found in as_they_end(pool, tasks) for trial in found]
-
-
-def _some_turns(folders: Sequence[Path], seeds: Sequence[int]) -> list[TurnTrial]:
-    cv2.setNumThreads(1)
-    return turn_trials(photographs(folders), seeds)
-
-
-def _pairs(asked: argparse.Namespace) -> tuple[list[PairTrial | None], list[PairTrial | None]]:
-    """Pairs of one pose, and as many of two scenes as there are photographs."""
+def _of_photographs(asked: argparse.Namespace) -> list[str]:
+    """The tables of all trials that are kept, after those that are missing have been made."""
     names = list(photographs(asked.folders))
-    each = max(asked.pairs // len(names), 1)
-    tasks = [
-        partial(_some_pairs, asked.folders, name, asked.still, each, asked.seed + number)
-        for number, name in enumerate(names)
-    ]
-    still: list[PairTrial | None] = []
-    others: list[PairTrial | None] = []
+    rounds = math.ceil(asked.pairs / PAIRS_OF_A_ROUND)
+    tasks = {
+        **{
+            f"turns {first}": partial(_turns, asked.folders, first)
+            for first in range(0, asked.turns, _AT_ONCE)
+        },
+        **{
+            f"pairs {names[number % len(names)]} {number}": partial(
+                _pairs, asked.folders, names[number % len(names)], number
+            )
+            for number in range(rounds)
+        },
+    }
+    kept = LinesFile(asked.output)
+    done = {str(row["task"]): row for row in kept.rows}
+    missing = [name for name in tasks if name not in done]
     with process_pool(asked.processes) as pool:
-        for _, (own, other) in as_they_end(pool, tasks):
-            still += own
-            others += other
-    return still, others
+        for number, row in as_they_end(pool, [tasks[name] for name in missing]):
+            done[missing[number]] = {"task": missing[number], **row}
+            kept.add([done[missing[number]]])
+    rows = [done[name] for name in tasks]
+
+    def all_of(part: str) -> list[Any]:
+        return [each for row in rows for each in row.get(part, ())]
+
+    turns = [TurnTrial(**each) for each in all_of("turns")]
+    still, others = (
+        [None if each is None else PairTrial(**each) for each in all_of(part)]
+        for part in ("still", "others")
+    )
+    return [turns_table(turns), pairs_table(still, others)]
 
 
-def _some_pairs(
-    folders: Sequence[Path], name: str, count: int, most: int, seed: int
-) -> tuple[list[PairTrial | None], list[PairTrial | None]]:
+def _turns(folders: Sequence[Path], first: int) -> dict[str, Any]:
+    cv2.setNumThreads(1)
+    trials = turn_trials(photographs(folders), range(first, first + _AT_ONCE))
+    return {"turns": [asdict(trial) for trial in trials]}
+
+
+def _pairs(folders: Sequence[Path], name: str, seed: int) -> dict[str, Any]:
+    """All pairs of some pictures of one pose, and each of these with a picture of another place."""
     cv2.setNumThreads(1)
     pictures = photographs(folders)
-    named = still_pictures(pictures, name, count, seed)
-    strangers = [
-        (other, describe(picture)) for other, picture in pictures.items() if other[:10] != name[:10]
-    ]
-    pairs = [(one, other) for one in range(count) for other in range(one + 1, count)]
-    draw = np.random.default_rng(seed)
-    chosen = [pairs[k] for k in draw.permutation(len(pairs))[:most].tolist()]
-    between = [(number, count + number % len(strangers)) for number in range(count)]
-    return pair_trials(named, chosen), pair_trials([*named, *strangers], between)
+    named = still_pictures(pictures, name, STILL, seed)
+    places = elsewhere(pictures, name)
+    places = [places[(seed + number) % len(places)] for number in range(STRANGERS)]
+    strangers = [(other, describe(pictures[other])) for other in places]
+    still = pair_trials(named, list(combinations(range(STILL), 2)))
+    between = [(number, STILL + number % STRANGERS) for number in range(STILL)]
+    others = pair_trials([*named, *strangers], between)
+    return {
+        part: [None if trial is None else asdict(trial) for trial in trials]
+        for part, trials in (("still", still), ("others", others))
+    }
 
 
 def _real(

@@ -51,6 +51,11 @@ def photographs(folders: Sequence[Path]) -> dict[str, Pixels]:
     return found
 
 
+def elsewhere(pictures: dict[str, Pixels], name: str) -> list[str]:
+    """The photographs of other places: those whose names begin otherwise, in ten characters."""
+    return [other for other in pictures if other[:10] != name[:10]]
+
+
 def turn_trials(pictures: dict[str, Pixels], seeds: Sequence[int]) -> list[TurnTrial]:
     """A trial for each seed: a photograph, a turn of 0 to 25 deg, and weather before and after."""
     return [_turn_trial(pictures, seed) for seed in seeds]
@@ -60,7 +65,7 @@ def _turn_trial(pictures: dict[str, Pixels], seed: int) -> TurnTrial:
     draw = np.random.default_rng(seed)
     names = list(pictures)
     name = names[int(draw.integers(len(names)))]
-    others = [picture for other, picture in pictures.items() if other[:10] != name[:10]]
+    others = [pictures[other] for other in elsewhere(pictures, name)]
     vector = _turn(draw)
     matrix = cv2.Rodrigues(vector + draw.normal(0, SWAY_RAD, 3))[0]
     other = others[int(draw.integers(len(others)))]
@@ -155,7 +160,7 @@ def still_pictures(
 ) -> list[tuple[str, Features]]:
     """Pictures of one pose in so many kinds of weather, half of them with boxes of people."""
     draw = np.random.default_rng(seed)
-    others = [picture for other, picture in pictures.items() if other[:10] != name[:10]]
+    others = [pictures[other] for other in elsewhere(pictures, name)]
     found = []
     for number in range(count):
         weather = drawn(draw, lorries=True)

@@ -117,10 +117,47 @@ def test_a_clock_alone_does_not_say_that_a_camera_stands():
     assert turn_between(describe(written(wall(0))), describe(written(wall(1))), LENS) is None
 
 
+def driven(width, by):
+    """A picture with something large in it, before and after it moved aside."""
+    lorry = wall(7)[:, :width]
+    pictures = wall(), wall()
+    for picture, at in zip(pictures, (60, 60 + by), strict=True):
+        picture[:, at : at + width] = lorry
+    return [describe(picture) for picture in pictures]
+
+
 def test_a_lorry_before_a_third_of_the_view_turns_nothing():
-    lorry = wall(7)[60:340, 0:215]
-    before, after = wall(), wall()
-    before[60:340, 100:315] = lorry
-    after[60:340, 160:375] = lorry
-    turn = turn_between(describe(before), describe(after), LENS)
-    assert turn is None or degrees(turn.angle_rad) < 0.1
+    turn = turn_between(*driven(215, 60), LENS)
+    assert degrees(turn.angle_rad) < 0.05
+    assert not turn.shifted
+
+
+@pytest.mark.parametrize("width", [320, 450])
+def test_a_bus_before_most_of_the_view_is_no_turn(width):
+    turn = turn_between(*driven(width, 60), LENS)
+    assert turn is None or degrees(turn.angle_rad) < 0.05
+
+
+def test_a_mask_that_hides_a_window_is_no_anchor():
+    _, picture = turned(heading=5.0)
+    before = wall()
+    for each in (before, picture):
+        each[120:220, 200:420] = 0
+    turn = turn_between(describe(before), describe(picture), LENS)
+    assert degrees(turned_pose(PRIOR, turn).heading_rad) == pytest.approx(45.0, abs=0.05)
+
+
+def test_a_camera_that_moved_aside_is_told_and_less_sure():
+    """Far things, above, stay; near ones, below, are 12 px aside, and so are those between."""
+    grey = wall()
+    rows = np.arange(360, dtype=np.float32)
+    aside = 12 + np.maximum(rows - 120, 0) / 240 * 40
+    u, v = np.meshgrid(np.arange(640, dtype=np.float32), rows)
+    after = cv2.remap(grey, u + aside[:, None].astype(np.float32), v, cv2.INTER_LINEAR)
+    turn = turn_between(describe(grey), describe(after), LENS)
+    assert turn.shifted
+    # It may not have turned at all: 12 px are 1.4 deg, and those below are up to 4.6 deg more.
+    assert degrees(turn.angle_rad) > 1.0
+    assert 0.5 < degrees(np.sqrt(turn.covariance[1, 1])) < 4.6
+    only = turn_between(describe(grey), describe(turned(heading=1.4)[1]), LENS)
+    assert not only.shifted
