@@ -47,6 +47,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "GET /ui/cameras/{camera_id}",
         "GET /ui/cameras/{camera_id}/posts",
         "GET /ui/fleet/banners",
+        "GET /ui/fleet/index",
         "GET /ui/fleet/rows",
         "GET /wall",
         f"GET {VIEWER_SCRIPT_URL}",
