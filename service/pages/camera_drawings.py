@@ -34,6 +34,7 @@ class CameraDrawings:
     plan: Markup
     spacing_m: float | None
     people: int
+    before: int
     two_poses: bool
     horizon: bool
 
@@ -42,6 +43,7 @@ def draw_camera(
     camera: CameraView,
     served: PoseView,
     tracks: Sequence[Trajectory],
+    before: Sequence[Trajectory],
     misplaced: Sequence[Misplacement],
     still: SnapshotRecord | None,
     zones: ZonesView,
@@ -59,6 +61,8 @@ def draw_camera(
     ground = ground_of(lens, overlays[-1].pose) if overlays else None
     feet = [_fewer(track.uv) for track in tracks]
     people = f"the feet of {len(feet)} people" if feet else "nobody yet"
+    if before:
+        people += f" and of {len(before)} before it moved"
     both = _OF[tuple(each.kind for each in overlays)]
     snapshot = None
     if still is not None:
@@ -68,6 +72,7 @@ def draw_camera(
             lens,
             overlays,
             feet,
+            [_fewer(track.uv) for track in before],
             label=f"The picture with {people}; horizon and ground grid of {both}.",
             ground=ground,
             snapshot_url=snapshot,
@@ -84,6 +89,7 @@ def draw_camera(
         else Markup(""),
         spacing_m=None if ground is None else ground.spacing_m,
         people=len(feet),
+        before=len(before),
         two_poses=len(overlays) > 1,
         horizon=any(horizon_path(lens, each.pose) for each in overlays),
     )

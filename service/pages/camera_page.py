@@ -1,11 +1,12 @@
 """`/ui/cameras/{id}`: the page of a camera, and all that it shows, read in one go."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Annotated
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 from sqlalchemy.orm import Session
 
@@ -15,7 +16,7 @@ from service.access.tokens import Caller
 from service.alerts.alerts import list_alerts
 from service.alerts.data_gaps import DataGap, data_gap_of
 from service.api.middleware.dependencies import ReadDep, StateDep
-from service.api.middleware.pages import CHARTS_URL, render
+from service.api.middleware.pages import render
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import snapshot_facts
@@ -23,6 +24,7 @@ from service.cameras.sources import SourceView, rival_sources
 from service.cameras.undo import UNDO_WITHIN, last_answer
 from service.cameras.zones import ZonesView, view_zones
 from service.enums import AlertState, PoseState, TokenScope
+from service.pages.camera_charts import RANGES, History, draw_charts, load_history, table_rows
 from service.pages.camera_drawings import draw_camera
 from service.pages.connecting import how_to_connect
 from service.settings import Settings
@@ -31,7 +33,7 @@ from service.store.alerts import AlertFilter, AlertRecord
 from service.store.cameras import PriorPoseRecord, SnapshotRecord
 from service.store.journal import ActivityRecord
 from service.store.references import MaintenanceRecord
-from service.store.tracks import trajectory_of
+from service.store.tracks import StoredTrack, trajectory_of
 from service.store.trainings import TrainingRecord
 from service.wording import alerts as alert_words
 from service.wording import camera as camera_words
@@ -60,7 +62,8 @@ class CameraPage:
 
     `alerts` are all that fire, and then those that ended last.
 
-    `tracks` are those that the served pose is of, the newest of them. `misplaced` is what the drift
+    `tracks` are those that the served pose is of, the newest of them, and `before` the last ones of
+    before a move. `misplaced` is what the drift
     means on the ground; empty where there is none. `sources` are those of its tracks, where there
     are several.
     """
@@ -71,6 +74,7 @@ class CameraPage:
     silence: DataGap | None
     newest_track_s: float | None
     tracks: tuple[Trajectory, ...]
+    before: tuple[Trajectory, ...]
     misplaced: tuple[Misplacement, ...]
     alerts: tuple[AlertStory, ...]
     priors: tuple[PriorPoseRecord, ...]
@@ -141,6 +145,11 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
     shown = tracks.newest(
         session, camera_id, _TRACKS, None if estimate is None else estimate.from_s
     )
+    earlier: Sequence[StoredTrack] = ()
+    if estimate is not None and estimate.drifted:
+        moved_s = [each.changed_at.timestamp() for each in pose.status.alerts if each.changed_at]
+        stood_to_s = min([estimate.from_s, *moved_s])
+        earlier = tracks.newest(session, camera_id, _TRACKS // 2, ended_to_s=stood_to_s)
     misplaced: tuple[Misplacement, ...] = ()
     # Of a camera that stands still it would tell of the estimate's noise.
     if (
@@ -156,6 +165,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         silence=data_gap_of(session, settings, camera_id, now),
         newest_track_s=tracks.newest_end_s(session, camera_id),
         tracks=tuple(trajectory_of(record) for record in shown),
+        before=tuple(trajectory_of(record) for record in earlier),
         misplaced=misplaced,
         alerts=tuple(
             AlertStory(
@@ -180,13 +190,16 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
 
 
 router = APIRouter(include_in_schema=False)
-# The one style that plotly 7.1.0 writes into a page by itself, of maps, which are not used here.
-# The hash lets in that and no other; a browser test tells when another version needs another one.
-_CHARTS_STYLE = "'sha256-ji27qzEtxXZW+7dun6UwjHXJ18e6WAin1VvNtkzIE/o='"
 
 
 @router.get("/ui/cameras/{camera_id}")
-def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
+def show(
+    camera_id: str,
+    request: Request,
+    state: StateDep,
+    session: ReadDep,
+    days: Annotated[int, Query(ge=0, le=3660, description="of the charts; 0 for all")] = 0,
+) -> HTMLResponse:
     """Has the camera moved, how far, since when, how sure, and what to do now."""
     page = view_camera_page(session, state.settings, camera_id)
     state.watched.note(camera_id)
@@ -195,7 +208,14 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
     learned = page.pose.reference
     caller: Caller | None = request.state.caller
     proposal = page.pose.proposed
-    answer = render(
+    history = History(
+        items=load_history(session, camera_id, days, page.now),
+        priors=page.priors,
+        alerts=[story.record for story in page.alerts],
+        acts=page.activity,
+        windows=page.windows,
+    )
+    return render(
         request,
         "camera/page.html",
         page=page,
@@ -207,7 +227,13 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         shown=camera_words.shown_as(page.pose.status.state, page.pose.status.alerts),
         undo=_undo(page, caller),
         drawings=draw_camera(
-            page.camera, page.pose, page.tracks, page.misplaced, page.snapshot, page.zones
+            page.camera,
+            page.pose,
+            page.tracks,
+            page.before,
+            page.misplaced,
+            page.snapshot,
+            page.zones,
         ),
         proposed=moves.proposed_rows(proposal.pose, proposal.sd) if proposal else None,
         zones=_zone_rows(page.zones),
@@ -224,12 +250,12 @@ def show(camera_id: str, request: Request, state: StateDep, session: ReadDep) ->
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,
-        chart_facts=_chart_facts(page),
-        charts_url=CHARTS_URL,
+        charts=draw_charts(history, clock),
+        chart_rows=table_rows(history.items, clock),
+        days=days,
+        ranges=RANGES,
         newest_event=page.newest_event_id,
     )
-    answer.headers["Content-Security-Policy"] += f"; style-src 'self' {_CHARTS_STYLE}"
-    return answer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,28 +313,3 @@ def _flags(page: CameraPage, clock: Clock) -> list[str]:
     for story in page.firing:
         flags += camera_words.page_alert_flags(story.record, story.group, clock)
     return list(dict.fromkeys(flags))
-
-
-def _chart_facts(page: CameraPage) -> dict[str, Any]:
-    """Marks of the charts beside the history: prior poses, oldest first, and alerts."""
-    return {
-        "camera_id": page.camera.record.id,
-        "priors": [
-            {
-                "at": prior.created_at.isoformat(),
-                "height_m": prior.height_m,
-                "tilt_rad": prior.tilt_rad,
-                "roll_rad": prior.roll_rad,
-                "heading_rad": prior.heading_rad,
-            }
-            for prior in reversed(page.priors)
-        ],
-        "alerts": [
-            {
-                "at": (story.record.changed_at or story.record.opened_at).isoformat(),
-                "words": alert_words.KINDS[story.record.kind],
-                "firing": story.record.state == AlertState.FIRING,
-            }
-            for story in page.alerts
-        ],
-    }

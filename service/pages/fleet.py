@@ -7,19 +7,20 @@ from datetime import UTC, datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, JSONResponse
 from markupsafe import Markup
 from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
 from service.access.tokens import Caller
 from service.api.middleware.dependencies import AppState, ReadDep, StateDep
-from service.api.middleware.pages import render
+from service.api.middleware.pages import HEADERS, render
 from service.api.schemas import Text
 from service.cameras.reference_views import reference_views
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
-from service.enums import AlertKind, PoseState, Severity, TokenScope
+from service.enums import PoseState, TokenScope
 from service.pages.drawings.sparkline import sparkline
+from service.pages.fleet_index import Entry, attended_until, entry_of, fleet_index
 from service.references import drift_limits, wanted_tracks
 from service.settings import Settings
 from service.store import alerts, fleet, journal
@@ -32,23 +33,12 @@ from service.wording.camera import (
     fleet_alert_flags,
     fleet_flags,
     fleet_line,
-    shown_as,
 )
 from service.wording.reasons import group_in_words
-from service.wording.times import Clock, from_seconds
+from service.wording.times import Clock
 
 _HISTORY = 24  # estimates of a sparkline
-# How soon a camera without an alert needs a person.
-_RANKS = {
-    PoseState.DRIFTING: 2,
-    PoseState.UNSURE: 3,
-    PoseState.SUSPECTED: 5,
-    PoseState.NO_DATA: 4,
-    PoseState.UNCALIBRATED: 6,
-    PoseState.UNCONNECTED: 7,
-    PoseState.LEARNING: 8,
-    PoseState.OK: 9,
-}
+PAGE = 50  # rows at once: more are neither read nor laid out in no time
 # No reference can be learned there yet.
 _WITHOUT_REFERENCE = (PoseState.UNCONNECTED, PoseState.UNCALIBRATED)
 
@@ -82,22 +72,9 @@ class FleetRow:
         return self.status.state
 
     @property
-    def shown(self) -> PoseState | AlertKind:
-        """The word of `STATES` for it."""
-        return shown_as(self.state, self.status.alerts)
-
-    @property
-    def waiting(self) -> int:
-        """Its alerts that nobody has taken up, but for those that a group speaks for."""
-        return sum(waits(alert, self.now) for alert in self.status.alerts)
-
-    @property
-    def attended_until(self) -> datetime | None:
-        """The end of the maintenance that is under way."""
-        now_s = self.now.timestamp()
-        spans = self.status.attended.spans
-        ends = (to_s for from_s, to_s in spans if from_s <= now_s < to_s)
-        return next((from_seconds(to_s) for to_s in ends), None)
+    def entry(self) -> Entry:
+        """The camera as it stands in the index."""
+        return entry_of(self.status, self.name, self.now)
 
     @property
     def words(self) -> str:
@@ -116,7 +93,8 @@ class FleetRow:
     @property
     def flags(self) -> tuple[str, ...]:
         """Whatever else is to be known of it at a glance."""
-        return fleet_flags(self.state, self.status.alerts, self.attended_until, self.now)
+        until = attended_until(self.status, self.now)
+        return fleet_flags(self.state, self.status.alerts, until, self.now)
 
     @property
     def training(self) -> int | None:
@@ -135,30 +113,6 @@ class FleetRow:
     def spark(self) -> Markup:
         """Its drift of late, drawn."""
         return sparkline(self.history)
-
-    @property
-    def rank(self) -> int:
-        """Urgency for a person: 0 at once, 8 not at all."""
-        alerts = self.status.alerts
-        if self.attended_until is not None:
-            return 5
-        if not alerts:
-            return _RANKS[self.state]
-        if not waits(alerts[0], self.now):
-            return 5 if alerts[0].is_silenced(self.now) else 3
-        return 0 if alerts[0].severity == Severity.CRITICAL else 1
-
-    @property
-    def order(self) -> tuple[int, float, str]:
-        """Sorts first what a person should look at first; of one kind the newest, then by name."""
-        at_s = self.status.since.timestamp() if self.rank < 6 else 0.0
-        return self.rank, -at_s, self.name.casefold()
-
-    @property
-    def key(self) -> str:
-        """The order as a string, which the page sorts by: newest first is what remains to 2**40."""
-        rank, negative_s, name = self.order
-        return f"{rank}-{2**40 + negative_s:016.1f}-{name}-{self.id}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,7 +158,7 @@ def list_fleet(
         for camera_id, each in statuses.items()
         if camera_id in names
     ]
-    return sorted(rows, key=lambda row: row.order)
+    return sorted(rows, key=lambda row: row.entry.order)
 
 
 def list_groups(session: Session) -> list[FleetGroup]:
@@ -236,12 +190,19 @@ router = APIRouter(include_in_schema=False)
 
 
 @router.get("/")
-def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
-    """Every camera, what needs a person first."""
+def show(
+    request: Request,
+    state: StateDep,
+    session: ReadDep,
+    q: Annotated[Text, Query(max_length=200)] = "",
+    wanted: Annotated[list[Text] | None, Query(alias="state", max_length=20)] = None,
+) -> HTMLResponse:
+    """The cameras that are asked for, what needs a person first: a page of them, and an index."""
     # What happens from here on is an event that the page asks for, even if it is in here too.
     newest = journal.newest_event_id(session)
-    cameras = list_fleet(session, state.settings)
-    count = Counter(camera.shown for camera in cameras)
+    index = fleet_index(session, state.settings)
+    count = Counter(entry.shown for entry in index)
+    found = [entry for entry in index if entry.fits(wanted or (), q.casefold().split())]
     groups = list_groups(session)
     return render(
         request,
@@ -249,10 +210,19 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
         newest_event=newest,
         counts=[(each, word, count[each]) for each, word in STATES.items()],
         waiting=alerts.count_waiting(session, datetime.now(UTC)),
-        rows=cameras,
+        index=[entry.line for entry in index],
+        rows=list_fleet(session, state.settings, [entry.id for entry in found[:PAGE]]),
+        page_size=PAGE,
         groups=groups,
         **_words(request, state),
     )
+
+
+@router.get("/ui/fleet/index")
+def index(state: StateDep, session: ReadDep) -> JSONResponse:
+    """All cameras in a few numbers each, as the page's script keeps them."""
+    lines = [entry.line for entry in fleet_index(session, state.settings)]
+    return JSONResponse(lines, headers=HEADERS)
 
 
 @router.get("/ui/fleet/rows")

@@ -347,10 +347,16 @@ def a_year(session: Session, camera_id: str) -> float:
 
 
 def newest(
-    session: Session, camera_id: str, limit: int, started_from_s: float | None = None
+    session: Session,
+    camera_id: str,
+    limit: int,
+    started_from_s: float | None = None,
+    ended_to_s: float | None = None,
 ) -> Sequence[StoredTrack]:
-    """The newest tracks, newest first; of those that started from a time on, if it is given."""
+    """The newest tracks, newest first; of those from a time on and up to one, if they are given."""
     conditions = started_from(camera_id, started_from_s)
+    if ended_to_s is not None:
+        conditions.append(TrackRecord.ended_s <= ended_to_s)
     return by_end(session, *conditions, newest_first=True, limit=limit)
 
 

@@ -54,7 +54,7 @@ def loads(page: Page) -> None:
 
 def alerts(page: Page, fleet: Fleet) -> None:
     """From the commit of an alert until its row says so."""
-    page.goto("/")
+    page.goto("/?state=ok&state=drifting")
     page.get_by_text("Live").wait_for()
     delays = []
     steady = page.locator("li.row.ok:not(:has(.flag))").evaluate_all(

@@ -117,7 +117,7 @@ def test_who_may_only_look_is_offered_no_acts(closed, browser):
     assert closed.http.post("/cameras", json=CAMERA).status_code in (201, 409)
     offered = {}
     context = browser.new_context(base_url=closed.url)
-    page = context.new_page()  # one for both: another would read the charts' code anew, for 2 s
+    page = context.new_page()
     for scope in ("read", "operate"):
         context.clear_cookies()
         log_in(page, "/", make_token(closed.settings, scope, name=scope))

@@ -172,7 +172,39 @@ def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
     assert page.locator(".chip.learning").get_attribute("aria-pressed") == "true"
     page.locator("#search").focus()
     page.keyboard.press("Escape")
+    page.locator("#row-quay").wait_for()  # it was not asked for before
     assert shown(page) == ["North door", "Quay"]
+
+
+def test_many_are_paged_sorted_and_chosen_across_pages(page, fleet, server):
+    expect = pytest.importorskip("playwright.sync_api").expect
+    for n in range(60):
+        fleet.add(f"c{n:02}", f"Camera {n:02}", tracks=1, estimates=1)
+    for n in (57, 58):
+        fleet.knock(f"c{n}")
+    page.goto("/?sort=name")
+    page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
+    page.get_by_text("Live").wait_for()
+    expect(page.locator("li.row")).to_have_count(50)
+    page.get_by_role("button", name="Next").click()
+    expect(page.locator("#shown")).to_have_text("51 to 60 of 60")
+    assert shown(page) == [f"Camera {n}" for n in range(50, 60)]
+    assert page.url.endswith("/?sort=name&page=2")
+    page.reload()
+    expect(page.locator("li.row")).to_have_count(10)
+    page.locator(".chip.drifting").click()
+    assert shown(page) == ["Camera 57", "Camera 58"]
+    page.locator(".chip.clock").click()  # chips add up
+    assert page.url.endswith("/?state=drifting&state=clock&sort=name")
+    page.get_by_label("Choose all that are found").check()
+    expect(page.locator("#chosen")).to_have_text("2 cameras")
+    shoot(page, "fleet-chosen")
+    assert axe(page) == []
+    page.get_by_role("button", name="They were put back").click()
+    page.locator(".chip.drifting[aria-pressed=true] b", has_text="0").wait_for()
+    expect(page.locator("#bulk")).to_be_hidden()
+    found = server.http.get("/alerts").json()["items"]
+    assert {(a["outcome"], a["resolved_by"]) for a in found} == {("put_back", "Ada")}
 
 
 def test_a_name_is_never_run(page, fleet):

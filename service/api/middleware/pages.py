@@ -41,7 +41,6 @@ def _url_of(package: str, name: str) -> str:
     return url
 
 
-CHARTS_URL = _url_of("plotly", "package_data/plotly.min.js")
 # Of the viewer the files alone; none of its code is run.
 VIEWER_SCRIPT_URL = _url_of("fastapi_swagger", "resources/swagger-ui-bundle.js")
 VIEWER_STYLE_URL = _url_of("fastapi_swagger", "resources/swagger-ui.css")

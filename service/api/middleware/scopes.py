@@ -5,7 +5,7 @@ from collections import defaultdict
 
 from starlette.routing import compile_path
 
-from service.api.middleware.pages import CHARTS_URL, VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
+from service.api.middleware.pages import VIEWER_SCRIPT_URL, VIEWER_STYLE_URL
 from service.enums import TokenScope
 
 # None: whoever asks.
@@ -47,9 +47,9 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "GET /ui/cameras/{camera_id}",
         "GET /ui/cameras/{camera_id}/posts",
         "GET /ui/fleet/banners",
+        "GET /ui/fleet/index",
         "GET /ui/fleet/rows",
         "GET /wall",
-        f"GET {CHARTS_URL}",
         f"GET {VIEWER_SCRIPT_URL}",
         f"GET {VIEWER_STYLE_URL}",
         "POST /cameras/{camera_id}/ground",

@@ -112,6 +112,7 @@ def picture_svg(
     lens: Intrinsics,
     overlays: Sequence[Overlay],
     tracks: Sequence[Array] = (),
+    before: Sequence[Array] = (),
     *,
     label: str,
     ground: Ground | None = None,
@@ -124,6 +125,7 @@ def picture_svg(
         lens: its size is that of the drawing.
         overlays: drawn in this order.
         tracks: pixels of feet, a track each.
+        before: those of before the camera moved.
         label: what a screen reader says of it.
         ground: the grid; that of the first overlay if not given.
         snapshot_url: a still image to lie behind it.
@@ -151,8 +153,10 @@ def picture_svg(
             f'text-anchor="middle" font-size="{lens.width / 24:.0f}">nothing but sky</text>'
         )
     parts += over
-    if tracks:
-        parts.append(f'<path class="track" d="{path_data(tracks, picture_frame(lens))}"/>')
+    for kind, some in (("then", before), ("now" if before else "", tracks)):
+        if some:
+            drawn = path_data(some, picture_frame(lens))
+            parts.append(f'<path class="track {kind}" d="{drawn}"/>')
     return svg("picture", f"-0.5 -0.5 {lens.width} {lens.height}", label, parts)
 
 

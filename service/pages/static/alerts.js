@@ -1,8 +1,9 @@
 // All alerts: answered in their lines, or many at once; what happens is fetched anew.
 
 import { announce, guarded } from "./act.js";
-import { ALERT_ACTS, done, listen, planMaintenance, silenceOf } from "./alert_acts.js";
-import { ask, signed } from "./dialogs.js";
+import { ALERT_ACTS, listen, planMaintenance, silenceOf } from "./alert_acts.js";
+import { actOn } from "./bulk_acts.js";
+import { ask } from "./dialogs.js";
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
 
@@ -42,24 +43,22 @@ async function refresh() {
   offer();
 }
 
-/** One act with all that are chosen; says what of them was refused. */
-async function withAll(words, act, more, of = (row) => row.dataset.id) {
-  const ids = [...new Set(picked().map(of))];
-  const answer = await signed("POST", "/acts", { ids, act, ...more });
-  if (answer === undefined) return undefined;
-  const refused = answer.items.filter(({ problem }) => problem);
-  const said = refused.length ? ` Of ${ids.length}, ${refused.length} were not: ${refused[0].problem.detail}` : "";
+const ids = (of) => [...new Set(picked().map(of))];
+
+/** Choose nothing any more, once it was done. */
+async function withAll(act, more, of = (row) => row.dataset.id) {
+  const items = await actOn(act, ids(of), more);
+  if (items === undefined) return undefined;
   for (const box of list.querySelectorAll(".pick")) box.checked = false;
-  await done(`${words}${said}`, Promise.resolve(answer));
-  return answer;
+  offer();
+  return items;
 }
 
 const BULK = {
-  resolve: ({ outcome }) => withAll("Noted.", "resolve", { outcome }),
-  acknowledge: () => withAll("Acknowledged.", "acknowledge", {}),
-  silence: () => ask("silence-dialog", { send: (said) => withAll("Silenced.", "silence", silenceOf(said)) }),
-  maintenance: () =>
-    planMaintenance((body) => withAll("Maintenance is planned.", "maintenance", body, (row) => row.dataset.camera)),
+  resolve: ({ outcome }) => withAll("resolve", { outcome }),
+  acknowledge: () => withAll("acknowledge"),
+  silence: () => ask("silence-dialog", { send: (said) => withAll("silence", silenceOf(said)) }),
+  maintenance: () => planMaintenance((body) => withAll("maintenance", body, (row) => row.dataset.camera)),
 };
 
 bulk?.addEventListener("click", (event) => {

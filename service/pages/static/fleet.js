@@ -1,73 +1,117 @@
-// The fleet as it is now: rows that something happened to are fetched anew, the others stay.
+// The fleet as it is now: an index of all cameras that is sifted and sorted here, and a page of rows,
+// which are fetched; rows that something happened to are fetched anew.
 
-import { announce } from "./act.js";
+import { announce, call, guarded } from "./act.js";
 import { ALERT_ACTS, listen } from "./alert_acts.js";
+import { withMany } from "./bulk_acts.js";
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
 
 const list = document.getElementById("rows");
 const search = document.getElementById("search");
+const sort = document.getElementById("sort");
+const bulk = document.getElementById("bulk");
+const all = document.getElementById("all");
+const pager = document.getElementById("pager");
 const chips = [...document.querySelectorAll(".chip")];
 const found = document.getElementById("found");
 const none = document.getElementById("none");
 const plainTitle = document.title.replace(/^\(\d+\) /, "");
-const MOST_IDS = 100; // more in one address is too long; then all are fetched
+const PAGE = Number(list.dataset.page);
+const MOST_IDS = 100; // more in one address is too long
 const ALL_AGAIN_MS = 120_000; // states that time alone changes
-
+const CALM = 6; // from this rank on it does not matter since when (fleet_index.py)
 const CALLED_OUT = ["alert.opened", "alert.updated"];
+const WORDS = Object.fromEntries(chips.map((chip) => [chip.dataset.state, chip.dataset.word]));
 
-let state = "";
+const index = new Map(); // what the service says of each camera
+const rows = new Map(); // the rows that have been fetched, by id
+const chosen = new Set();
+let states = new Set();
+let page = 0;
+let wanted = []; // the ids of this page
 
-/** Show the rows that are asked for, and how many there are of each state. */
-function sift() {
+function note([id, name, state, rank, waiting, since, last, words]) {
+  const text = `${name} ${id} ${WORDS[state]} ${words}`.toLowerCase();
+  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text });
+}
+
+const byName = (a, b) => (a.name < b.name ? -1 : a.name > b.name ? 1 : a.id < b.id ? -1 : 1);
+const ORDERS = {
+  "": (a, b) => a.rank - b.rank || (a.rank < CALM ? b.since - a.since : 0) || byName(a, b),
+  name: byName,
+  since: (a, b) => b.since - a.since || byName(a, b),
+  last: (a, b) => (a.last ?? 0) - (b.last ?? 0) || byName(a, b),
+};
+
+/** The cameras that are asked for, in their order. */
+function matching() {
   const words = search.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
+  const fits = ({ state, text }) => (!states.size || states.has(state)) && words.every((word) => text.includes(word));
+  return [...index.values()].filter(fits).sort(ORDERS[sort.value] ?? ORDERS[""]);
+}
+
+/** Show the page that is asked for, and how many there are of each state. */
+async function show() {
+  const cameras = matching();
+  page = Math.min(page, Math.max(Math.ceil(cameras.length / PAGE) - 1, 0));
+  const mine = (wanted = cameras.slice(page * PAGE, (page + 1) * PAGE).map(({ id }) => id));
+  say(cameras);
+  const lacking = mine.filter((id) => !rows.has(id));
+  if (lacking.length) await fetchRows(lacking);
+  if (mine !== wanted) return; // another page is asked for by now
+  const held = document.activeElement?.closest?.("li.row");
+  const what = held && (document.activeElement.matches(".pick") ? ".pick" : "a");
+  const now = mine.map((id) => rows.get(id)).filter(Boolean);
+  if (now.length !== list.children.length || now.some((row, at) => row !== list.children[at])) list.replaceChildren(...now);
+  if (held && !list.contains(document.activeElement)) {
+    (document.querySelector(`#row-${CSS.escape(held.dataset.id)} ${what}`) ?? document.getElementById("main")).focus({ preventScroll: true });
+  }
+}
+
+function say(cameras) {
   const counts = {};
-  let shown = 0;
-  for (const row of list.children) {
-    const { state: its, text } = row.dataset;
-    counts[its] = (counts[its] ?? 0) + 1;
-    row.hidden = (state && its !== state) || !words.every((word) => text.includes(word));
-    if (!row.hidden) shown += 1;
+  let waiting = [...document.querySelectorAll("#banners [data-waiting]")].reduce((sum, each) => sum + Number(each.dataset.waiting), 0);
+  for (const { state, waiting: its } of index.values()) {
+    counts[state] = (counts[state] ?? 0) + 1;
+    waiting += its;
   }
   for (const chip of chips) {
     const count = counts[chip.dataset.state] ?? 0;
     chip.querySelector("b").textContent = count;
     chip.classList.toggle("empty-state", !count);
-    chip.setAttribute("aria-pressed", String(chip.dataset.state === state));
+    chip.setAttribute("aria-pressed", String(states.has(chip.dataset.state)));
   }
-  const waiting = [...document.querySelectorAll("[data-waiting]")].reduce((sum, each) => sum + Number(each.dataset.waiting), 0);
   document.title = (waiting ? `(${waiting}) ` : "") + plainTitle;
-  none.hidden = shown > 0;
-  if (!shown && list.children.length) none.textContent = "No camera is like that.";
-  return shown;
+  none.hidden = cameras.length > 0;
+  if (index.size) none.textContent = "No camera is like that.";
+  found.textContent = cameras.length === 1 ? "1 camera" : `${cameras.length} cameras`;
+  pager.hidden = cameras.length <= PAGE;
+  const last = Math.min((page + 1) * PAGE, cameras.length);
+  document.getElementById("shown").textContent = `${page * PAGE + 1} to ${last} of ${cameras.length}`;
+  document.getElementById("back").disabled = page === 0;
+  document.getElementById("forth").disabled = last === cameras.length;
+  if (!bulk) return;
+  for (const id of chosen) if (!index.has(id)) chosen.delete(id);
+  bulk.hidden = !chosen.size;
+  document.getElementById("chosen").textContent = chosen.size === 1 ? "1 camera" : `${chosen.size} cameras`;
+  all.checked = cameras.length > 0 && cameras.every(({ id }) => chosen.has(id));
 }
 
-function siftAndSay() {
-  const shown = sift();
-  found.textContent = shown === 1 ? "1 camera" : `${shown} cameras`;
+/** Show what is asked for by now, from its first page on, and keep it in the address. */
+function ask() {
+  page = 0;
+  keepAddress();
+  show().catch(console.warn);
+}
+
+function keepAddress() {
   const query = new URLSearchParams();
   if (search.value.trim()) query.set("q", search.value.trim());
-  if (state) query.set("state", state);
+  for (const state of states) query.append("state", state);
+  if (sort.value) query.set("sort", sort.value);
+  if (page) query.set("page", page + 1);
   history.replaceState(null, "", query.size ? `?${query}` : location.pathname);
-}
-
-/** Put rows where they belong by their keys, in place of those asked for, or of all. */
-function place(fresh, asked) {
-  const held = document.activeElement?.closest?.("li.row")?.dataset.id;
-  if (!asked) {
-    list.replaceChildren(...fresh);
-  } else {
-    for (const id of asked) document.getElementById(`row-${id}`)?.remove();
-    for (const row of fresh) {
-      row.classList.add("fresh");
-      const after = [...list.children].find((other) => other.dataset.key > row.dataset.key);
-      list.insertBefore(row, after ?? null);
-    }
-  }
-  if (held && !list.contains(document.activeElement)) {
-    document.querySelector(`#row-${CSS.escape(held)} a`)?.focus({ preventScroll: true });
-  }
-  sift();
 }
 
 async function fragment(url) {
@@ -78,11 +122,35 @@ async function fragment(url) {
   return holder.content;
 }
 
+/** Take rows as they were told, and what they say of their cameras. */
+function keep(fresh) {
+  for (const row of fresh) {
+    const box = row.querySelector(".pick");
+    if (box) box.checked = chosen.has(row.dataset.id);
+    rows.set(row.dataset.id, row);
+    note(JSON.parse(row.dataset.line));
+  }
+}
+
 async function fetchRows(ids) {
-  const some = ids && ids.length <= MOST_IDS ? ids : null;
-  const query = some ? `?ids=${some.map(encodeURIComponent).join(",")}` : "";
-  const content = await fragment(`/ui/fleet/rows${query}`);
-  place([...content.querySelectorAll("li.row")], some);
+  for (let at = 0; at < ids.length; at += MOST_IDS) {
+    const some = ids.slice(at, at + MOST_IDS);
+    const content = await fragment(`/ui/fleet/rows?ids=${some.map(encodeURIComponent).join(",")}`);
+    const fresh = [...content.querySelectorAll("li.row")];
+    for (const id of some) {
+      rows.delete(id);
+      index.delete(id); // unless it is still told of
+    }
+    keep(fresh);
+  }
+}
+
+async function fetchAll() {
+  const lines = await call("GET", "/ui/fleet/index");
+  index.clear();
+  lines.forEach(note);
+  rows.clear();
+  await show();
 }
 
 async function fetchBanners() {
@@ -101,11 +169,12 @@ async function look(events) {
   }
   try {
     await Promise.all([ids.size ? fetchRows([...ids]) : null, banners ? fetchBanners() : null]);
+    for (const id of ids) rows.get(id)?.classList.add("fresh");
+    await show();
   } catch (error) {
     console.warn(error); // the next event or the next look at all comes soon
     return;
   }
-  sift();
   // What somebody has done with an alert is seen, and is no news to call out.
   const alert = events.findLast(({ data }) => CALLED_OUT.includes(data.message));
   if (alert) announce(wordsOf(alert.data));
@@ -113,7 +182,7 @@ async function look(events) {
 
 function wordsOf(alert) {
   if (!alert.camera_id) return alert.reason;
-  const row = document.getElementById(`row-${alert.camera_id}`);
+  const row = rows.get(alert.camera_id);
   if (!row) return "";
   return `${row.querySelector(".who a").textContent}: ${row.querySelector(".words").textContent}`;
 }
@@ -121,16 +190,25 @@ function wordsOf(alert) {
 const soon = gathered(look, 100);
 const later = gathered(look, 1000);
 subscribe((event) => (event.type === "alert" ? soon(event) : later(event)));
-setInterval(() => document.hidden || fetchRows(null).catch(console.warn), ALL_AGAIN_MS);
+setInterval(() => document.hidden || fetchAll().catch(console.warn), ALL_AGAIN_MS);
 keepTimes(list, document.getElementById("banners"));
 listen(document.getElementById("banners"), ALERT_ACTS);
 
-search.addEventListener("input", siftAndSay);
+search.addEventListener("input", ask);
 search.form.addEventListener("submit", (event) => event.preventDefault());
+sort.addEventListener("change", ask);
 for (const chip of chips) {
   chip.addEventListener("click", () => {
-    state = state === chip.dataset.state ? "" : chip.dataset.state;
-    siftAndSay();
+    if (!states.delete(chip.dataset.state)) states.add(chip.dataset.state);
+    ask();
+  });
+}
+for (const [id, by] of [["back", -1], ["forth", 1]]) {
+  document.getElementById(id).addEventListener("click", async () => {
+    page += by;
+    keepAddress();
+    await show();
+    list.scrollIntoView({ block: "start" });
   });
 }
 document.addEventListener("keydown", (event) => {
@@ -141,12 +219,36 @@ document.addEventListener("keydown", (event) => {
   }
   if (event.key === "Escape" && event.target === search) {
     search.value = "";
-    siftAndSay();
+    ask();
   }
 });
 
+// --- Many at once ------------------------------------------------------------------------------
+
+function choose(ids, on) {
+  for (const id of ids) {
+    if (on) chosen.add(id);
+    else chosen.delete(id);
+    const box = rows.get(id)?.querySelector(".pick");
+    if (box) box.checked = on;
+  }
+  say(matching());
+}
+
+list.addEventListener("change", ({ target }) => target.matches(".pick") && choose([target.closest("li").dataset.id], target.checked));
+all?.addEventListener("change", () => choose(matching().map(({ id }) => id), all.checked));
+document.getElementById("none-chosen")?.addEventListener("click", () => choose([...chosen], false));
+bulk?.addEventListener("click", (event) => {
+  const button = event.target.closest("button[data-bulk]");
+  if (button) guarded(button, () => withMany(button.dataset.bulk, [...chosen], () => choose([...chosen], false)));
+});
+
+JSON.parse(document.getElementById("index").textContent).forEach(note);
+keep(list.querySelectorAll("li.row"));
 const asked = new URLSearchParams(location.search);
 search.value = asked.get("q") ?? "";
-state = chips.some((chip) => chip.dataset.state === asked.get("state")) ? asked.get("state") : "";
-sift();
+sort.value = asked.get("sort") ?? "";
+states = new Set(asked.getAll("state").filter((state) => state in WORDS));
+page = Math.max(Number(asked.get("page") ?? 1) - 1 || 0, 0);
+show().catch(console.warn);
 performance.mark("usable"); // for tests.benchmarks.fleet

@@ -28,10 +28,7 @@ def tab(browser, server):
 
 @pytest.fixture
 def page(tab, server):
-    """The one tab of a file, as if it was new: each new one would read the charts' code anew.
-
-    That takes 2 s, more than most of these tests.
-    """
+    """The one tab of a file, as if it was new."""
     made, wrong = tab
     made.goto("/healthz")
     made.evaluate("localStorage.clear(); sessionStorage.clear()")
@@ -101,5 +98,5 @@ def knocked(server, databases, once_knocked):
 def seen(page, knocked):
     """The page of a knocked camera, as it is once its charts are there."""
     page.goto(URL)
-    page.wait_for_selector("#charts[data-points]")
+    page.wait_for_selector("#charts svg")
     return page

@@ -40,14 +40,21 @@ def test_a_knock_arrives_without_a_reload(page, bench):
     assert page.evaluate("window.untouched")
 
 
-def test_the_charts_have_points_and_zoom_by_buttons(seen):
+def test_the_charts_are_of_as_many_days_as_are_asked_for(seen):
     expect = pytest.importorskip("playwright.sync_api").expect
-    assert seen.locator("#charts").get_attribute("data-points") == "5"
-    assert seen.locator("#charts .scatterlayer .point").count() >= 4 * 5
-    seen.get_by_role("button", name="24 hours").click()
-    expect(seen.get_by_role("button", name="24 hours")).to_have_attribute("aria-pressed", "true")
+    assert seen.locator("#charts svg").count() == 4
+    assert seen.locator("#charts circle").count() == 4 * 5
+    seen.get_by_role("link", name="24 hours").click()
+    expect(seen.get_by_role("link", name="24 hours")).to_have_attribute("aria-current", "true")
     seen.locator("#charts-table summary").click()
     expect(seen.locator("#charts-values")).to_contain_text("26.99° ±0.36")
+    # Where people walked then and now; a grid at a time, of whoever wants one.
+    expect(seen.locator(".picture .track.then")).to_be_attached()
+    expect(seen.locator(".picture .grid.served")).to_be_hidden()
+    seen.get_by_label("Ground as it is").check()
+    expect(seen.locator(".picture .grid.served")).to_be_visible()
+    expect(seen.locator(".picture .grid.prior")).to_be_hidden()
+    shoot(seen, "charts")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -57,7 +64,7 @@ def test_the_page_is_sound(page, knocked, server, scheme):
             note(session, Activity.CAMERA_CHANGED, by="Ada", camera_id="corner")
     page.emulate_media(color_scheme=scheme)
     page.goto(URL)
-    page.wait_for_selector("#charts[data-points]")
+    page.wait_for_selector("#charts svg")
     assert axe(page) == []
     for dialog in ("name", "silence", "maintain"):
         page.evaluate(f"document.getElementById('{dialog}-dialog').showModal()")
@@ -107,7 +114,7 @@ def test_a_knocked_street_is_seen_to_be_knocked(page, server, empty):
         street.keep_to_lanes(STREET_PRIOR, 25)
         street.look()
     expect(page.locator(".headline")).to_contain_text("Standing where it should", timeout=30_000)
-    expect(page.locator("#charts")).to_have_attribute("data-points", re.compile("^[4-9]"))
+    expect(page.locator("#charts circle").nth(15)).to_be_attached()
     shoot(page, "camera-still")
     for _ in range(4):
         street.keep_to_lanes(KNOCKED, 15)

@@ -33,7 +33,7 @@ def test_zones_of_a_knocked_camera_are_seen_said_and_downloaded(page, bench, sch
     for _ in range(2):
         bench.see(moved(tilt_deg=4, heading_deg=-3), change=5, paths=True)
     page.goto(URL)
-    page.wait_for_selector("#charts[data-points]")
+    page.wait_for_selector("#charts svg")
     assert page.locator(".zone.drawn").count() == 4
     assert "still lies where it was drawn" in page.locator(".zones-meant").inner_text()
     assert page.locator(".zones-meant li").first.inner_text().startswith("line")

@@ -1,6 +1,5 @@
 """A camera's page out of the store: the sentence, drawings, flags, activity, the script."""
 
-import gzip
 import html
 import re
 from datetime import UTC, datetime, timedelta
@@ -10,7 +9,6 @@ import pytest
 from fastapi.testclient import TestClient
 from PIL import Image
 
-from service.api.middleware.pages import CHARTS_URL
 from service.app import create_app
 from tests.conftest import CAMERA, track
 from tests.service.bench import PRIOR, moved
@@ -142,17 +140,42 @@ def test_there_is_no_page_of_no_camera(http):
     assert looked_for.headers["content-type"].startswith("text/html")
 
 
-def test_the_chart_script_comes_out_of_its_package(corner):
-    assert CHARTS_URL in page(corner)
-    answer = corner.get(CHARTS_URL)
-    assert answer.headers["content-type"].startswith("text/javascript")
-    assert answer.headers["content-encoding"] == "gzip"
-    assert "immutable" in answer.headers["cache-control"]
-    assert b"plotly" in answer.content[:200]
-    plain = corner.get(CHARTS_URL, headers={"Accept-Encoding": "identity"})
-    assert "content-encoding" not in plain.headers
-    assert plain.content == answer.content
-    assert len(gzip.compress(answer.content, 6)) < 2_000_000
+def test_charts_say_something_from_one_estimate_on(bench):
+    """One estimate had an axis of two milliseconds, no prior line and no alert line."""
+    assert "the charts begin with the first one" in page(bench.http)
+    bench.see(moved(tilt_deg=5.0), paths=True)
+    text = page(bench.http)
+    charts = re.findall(r'<svg class="chart".*?</svg>', text, re.S)
+    assert len(charts) == 4
+    for chart in charts:
+        assert chart.count('<path class="prior"') == 1
+        assert chart.count('<path class="band"') == 1
+        assert chart.count('<g class="alarm"') == 1
+    ticks = set(re.findall(r'text-anchor="middle">([^<]+)<', charts[0]))
+    assert 3 <= len(ticks) <= 5
+    assert all(re.fullmatch(r"\d\d:\d\d|\d+ \w+", tick) for tick in ticks)
+    assert "<strong>Tilt</strong> 26.99° ±0.3" in text or "<strong>Tilt</strong> 27.0" in text
+    bench.http.post("/cameras/corner/pose/put-back", json={"by": "Ada"}).raise_for_status()
+    text = page(bench.http)
+    assert text.count('<g class="act"') == 4
+    assert "Ada said that the camera is back at its prior pose." in text
+    assert "Plotly" not in text
+
+
+def test_a_page_of_a_long_history_is_light(bench):
+    """It was 1,500 KB, 1,437 of them a chart library."""
+    for n in range(50):  # the most that have a dot each
+        bench.see(moved(tilt_deg=0.1 * n), people=4)
+    text = page(bench.http)
+    files = set(re.findall(r'(?:href|src)="(/ui/static/[^"#]+)', text))
+    imported = {
+        f"{name.rpartition('/')[0]}/{each}"
+        for name in files
+        if name.endswith(".js")
+        for each in re.findall(r'from "./([^"]+)"', bench.http.get(name).text)
+    }
+    loaded = {name: len(bench.http.get(name).content) for name in files | imported}
+    assert len(text) + sum(loaded.values()) < 250_000, (len(text), loaded)
 
 
 @pytest.mark.parametrize("allowed", ["off", "features", "pictures"])

@@ -1,5 +1,7 @@
 """The fleet page and its parts, over a real store."""
 
+import html as html_of
+import json
 import re
 from datetime import UTC, datetime, timedelta
 
@@ -54,8 +56,11 @@ def test_what_needs_a_person_comes_first(http, fleet):
         ("learning", "learns"),
         ("ok", "steady"),
     ]
-    keys = re.findall(r'data-key="([^"]+)"', html)
-    assert keys == sorted(keys)  # the page sorts by them as strings
+    # The script sorts as the service does: by rank, then the newest, then by name.
+    told = [json.loads(html_of.unescape(each)) for each in re.findall(r'data-line="([^"]+)"', html)]
+    assert told == json.loads(re.search(r'id="index">(.*?)</script>', html)[1])
+    assert [each[3] for each in told] == sorted(each[3] for each in told)
+    assert told == http.get("/ui/fleet/index").json()
     assert "turned 3.1° (tilt +3.0°, pan −0.8°), " in words(html, "knocked")
     assert "cm lower" in words(html, "knocked")
     assert "seen by Ines" in words(html, "seen")
@@ -64,6 +69,22 @@ def test_what_needs_a_person_comes_first(http, fleet):
     assert "standing still" in words(html, "steady")
     assert "<title>(2) Cameras" in html  # one of the three is seen to
     assert re.search(r"<b>3</b> Moved", html)
+
+
+def test_a_page_of_many_has_as_many_rows_as_are_looked_at(http, fleet):
+    """2,000 cameras were 38,100 nodes, and on a phone 258,482 px tall."""
+    for n in range(70):
+        fleet.add(f"c{n:02}", f"Camera {n}", "learning" if n % 2 else "ok", tracks=1, estimates=1)
+    html = http.get("/").text
+    assert len(rows(html)) == 50
+    index = re.search(r'id="index">(.*?)</script>', html)[1]
+    assert len(json.loads(index)) == 70
+    assert len(index) < 70 * 90  # 2,000: 180 KB
+    assert len(html) - len(index) < 110_000
+    asked = http.get("/?state=ok&state=drifting&q=camera+c4").text
+    assert {camera_id for _, camera_id in rows(asked)} == {"c40", "c42", "c44", "c46", "c48"}
+    assert [i for _, i in rows(http.get("/?q=cam-c07").text)] == ["c07"]  # by its tracker
+    assert len(rows(http.get("/?q=steady").text)) == 35  # by its state
 
 
 def test_flags_say_what_is_under_way(http, fleet):

@@ -1,0 +1,107 @@
+"""All cameras of the fleet in a few numbers each: what its page sifts, sorts and counts by."""
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from service.cameras.status import CameraStatus, camera_statuses, waits
+from service.enums import AlertKind, PoseState, Severity
+from service.settings import Settings
+from service.store import fleet
+from service.wording.camera import STATES, shown_as
+from service.wording.times import from_seconds
+
+# How soon a camera without an alert needs a person.
+_RANKS = {
+    PoseState.DRIFTING: 2,
+    PoseState.UNSURE: 3,
+    PoseState.SUSPECTED: 5,
+    PoseState.NO_DATA: 4,
+    PoseState.UNCALIBRATED: 6,
+    PoseState.UNCONNECTED: 7,
+    PoseState.LEARNING: 8,
+    PoseState.OK: 9,
+}
+_CALM = 6  # from this rank on it does not matter since when
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """A camera of the index: its `rank` is 0 where it needs a person at once, 9 not at all.
+
+    `waiting` are its alerts that nobody has taken up. `words` is what else it is found by: its
+    source of tracks, who has seen its alerts.
+    """
+
+    id: str
+    name: str
+    shown: PoseState | AlertKind
+    rank: int
+    waiting: int
+    since_s: int
+    last_s: int | None
+    words: str
+
+    @property
+    def order(self) -> tuple[int, int, str, str]:
+        """Sorts first what a person should look at first; of one kind the newest, then by name."""
+        calm = self.rank >= _CALM
+        return self.rank, 0 if calm else -self.since_s, self.name.casefold(), self.id
+
+    @property
+    def line(self) -> list[str | int | None]:
+        """As the page's script reads it (fleet.js)."""
+        return [
+            *(self.id, self.name, self.shown, self.rank, self.waiting, self.since_s),
+            *(self.last_s, self.words),
+        ]
+
+    def fits(self, states: Collection[str], words: Iterable[str]) -> bool:
+        """True of one of some states, if any are named, in which all words are found."""
+        text = f"{self.name} {self.id} {STATES[self.shown]} {self.words}".casefold()
+        return (not states or self.shown in states) and all(word in text for word in words)
+
+
+def entry_of(status: CameraStatus, name: str, now: datetime) -> Entry:
+    """The entry of a camera."""
+    seen_by = [each.acknowledged_by for each in status.alerts if each.acknowledged_by is not None]
+    source = status.reference.source
+    return Entry(
+        id=status.camera_id,
+        name=name,
+        shown=shown_as(status.state, status.alerts),
+        rank=_rank(status, now),
+        waiting=sum(waits(alert, now) for alert in status.alerts),
+        since_s=int(status.since.timestamp()),
+        last_s=None if status.last_track_s is None else int(status.last_track_s),
+        words=" ".join([*([source] if source else []), *seen_by]),
+    )
+
+
+def fleet_index(session: Session, settings: Settings) -> list[Entry]:
+    """All cameras, those first that need a person."""
+    now = datetime.now(UTC)
+    names = dict(fleet.names(session, None))
+    statuses = camera_statuses(session, settings)
+    entries = [entry_of(each, names[i], now) for i, each in statuses.items() if i in names]
+    return sorted(entries, key=lambda entry: entry.order)
+
+
+def attended_until(status: CameraStatus, now: datetime) -> datetime | None:
+    """The end of the maintenance that is under way."""
+    now_s = now.timestamp()
+    ends = (to_s for from_s, to_s in status.attended.spans if from_s <= now_s < to_s)
+    return next((from_seconds(to_s) for to_s in ends), None)
+
+
+def _rank(status: CameraStatus, now: datetime) -> int:
+    if attended_until(status, now) is not None:
+        return 5
+    if not status.alerts:
+        return _RANKS[status.state]
+    first = status.alerts[0]
+    if not waits(first, now):
+        return 5 if first.is_silenced(now) else 3
+    return 0 if first.severity == Severity.CRITICAL else 1
