@@ -304,6 +304,7 @@ _OTHERS = {
     "still-days": "studies.alarms.still_days",
     "cuts": "studies.alarms.cut_study",
     "heads": "studies.paths.heads_study",
+    "lens": "studies.lens_study",
     "self-calibration": "studies.self_calibration_study",
     "arrivals": "studies.alarms.arrivals_study",
     "base-study": "studies.base_model.base_study",

@@ -38,13 +38,15 @@ class SelfCalibration:
     """Tilt, roll, log height (3,) with their covariance (3, 3), by people alone.
 
     `identifiable` names those that are known well enough to be of use, by so many people or groups
-    who walked independently.
+    who walked independently. `log_posterior`, of the best end, compares lenses before the same
+    people.
     """
 
     values: Array
     covariance: Array
     identifiable: tuple[str, ...]
     walking_groups: int
+    log_posterior: float
 
     @property
     def pose(self) -> CameraPose:
@@ -172,6 +174,7 @@ def _mixed(ends: Sequence[_End]) -> SelfCalibration:
         covariance=covariance,
         identifiable=tuple(name for name, sure in named if sure),
         walking_groups=best.walking_groups,
+        log_posterior=best.log_posterior,
     )
 
 

@@ -114,7 +114,7 @@ def make_token(session: Session, spec: TokenSpec, by: str | None) -> MadeToken:
         **{"cameras": record.cameras, "sources": record.sources},
     }
     note(session, Activity.TOKEN_ADDED, by=by, subject_id=token_id, details=details)
-    return MadeToken(record=record, text=f"{_PREFIX}_{token_id}_{secret}")
+    return MadeToken(record=record, text=text_of(token_id, secret))
 
 
 def revoke_token(session: Session, token_id: str, by: str | None) -> TokenRecord:
@@ -161,6 +161,11 @@ def caller_of(record: TokenRecord) -> Caller:
 def is_valid(record: TokenRecord, now: datetime) -> bool:
     """True of a token that is neither revoked nor over."""
     return record.revoked_at is None and (record.expires_at is None or now < record.expires_at)
+
+
+def text_of(token_id: str, secret: str) -> str:
+    """A token as it is said."""
+    return f"{_PREFIX}_{token_id}_{secret}"
 
 
 def hash_of(secret: str) -> str:

@@ -28,7 +28,7 @@ from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
 from service.enums import PoseState
 from service.notifications.send import read_url
-from service.wording.typed_pose import Tone, judge_lens, judge_pose
+from service.wording.typed_pose import judge_typed
 
 
 def _checked_url(text: str) -> str:
@@ -176,12 +176,8 @@ class CameraAnswer(CameraOut):
     @classmethod
     def from_value(cls, view: CameraView) -> Self:
         """The body of a camera, with the remarks of the registration form on it."""
-        says = judge_lens(view.intrinsics)
-        if view.calibrated:
-            says = judge_pose(view.intrinsics, view.prior_pose, typed_angles=True)
-        asked = [
-            QuestionOut.of(each) for each in says if each.kind in (Tone.CRITICAL, Tone.WARNING)
-        ]
+        # Of a pose that is assumed, what was measured may be a slip, too.
+        asked = [QuestionOut.of(each) for each in judge_typed(view.intrinsics, view.prior_pose)]
         return cls(**dict(CameraOut.from_value(view)), questions=asked)
 
 

@@ -16,6 +16,7 @@ log = logging.getLogger("surefoot.serve")
 _STOP_S = 10.0
 _TICK_S = 0.2
 _SETTLED_S = 60.0  # who lives for so long did not die of how it starts
+TOKEN_VARIABLE = "SUREFOOT_TOKEN"
 _ANY = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 
 
@@ -25,10 +26,13 @@ class LocalBridge:
     `serve` goes on without it: its log says that it died, and why.
     """
 
-    def __init__(self, settings: Settings, host: str, port: int) -> None:
+    def __init__(self, settings: Settings, host: str, port: int, token: str | None) -> None:
         host = _ANY.get(host, host)
         self._url = f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
         self._settings = settings
+        self._environment = settings.as_environment()
+        if token is not None:  # no flag: every user of a machine sees the words of its commands
+            self._environment[TOKEN_VARIABLE] = token
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._keep, daemon=True)
 
@@ -61,7 +65,7 @@ class LocalBridge:
         with subprocess.Popen(
             [*command, "--follow-stdin"],
             stdin=subprocess.PIPE,
-            env=self._settings.as_environment(),
+            env=self._environment,
         ) as process:
             while process.poll() is None and not self._stopping.wait(_TICK_S):
                 pass

@@ -13,9 +13,10 @@ from functools import partial
 
 import uvicorn
 
+from service.access.bridge_token import TOKEN_ID, renew_bridge_token
 from service.api.middleware.connections import ConnectionGuard, GuardedProtocol
 from service.api.middleware.hosts import auth_on, is_loopback
-from service.commands.local_bridge import LocalBridge
+from service.commands.local_bridge import TOKEN_VARIABLE, LocalBridge
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
 from service.settings import Settings
@@ -72,7 +73,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         host, port = listener.getsockname()[:2]
         with (
             LocalWorkers(settings, give_up) as workers,
-            LocalBridge(settings, host, port),
+            LocalBridge(settings, host, port, _bridge_token(settings)),
         ):
             log.info("serving", extra={"url": f"http://{host}:{port}"})
             settle_collector()
@@ -96,13 +97,24 @@ def _require_way_in(settings: Settings) -> None:
     if settings.proxy_from:
         return
     with contextlib.closing(Store(settings)) as store, store.read() as session:
-        count = access.count_valid(session, datetime.now(UTC))
+        count = access.count_valid(session, datetime.now(UTC), besides=TOKEN_ID)
     if not count:
         raise StartError(
             "auth: tokens are needed here, and nobody has one; make one by `surefoot token add "
             "NAME --scope admin` with the same data directory, or let everybody in by "
             "SUREFOOT_AUTH=off"
         )
+
+
+def _bridge_token(settings: Settings) -> str | None:
+    """A token for the bridge that runs here; None where it needs none, or has one by hand."""
+    if settings.mqtt_url is None or not auth_on(settings) or os.environ.get(TOKEN_VARIABLE):
+        return None
+    with contextlib.closing(Store(settings)) as store, store.write() as session:
+        token = renew_bridge_token(session)
+    if token is None:
+        log.warning("bridge_token_revoked", extra={"needed": TOKEN_VARIABLE})
+    return token
 
 
 def listen(settings: Settings) -> socket.socket:

@@ -1,5 +1,6 @@
 """`/ui/register`: a camera by a form, with a preview before anything is stored."""
 
+from dataclasses import replace
 from typing import Annotated, Self
 
 import numpy as np
@@ -8,6 +9,7 @@ from fastapi.responses import HTMLResponse
 from pydantic import BaseModel, Field
 
 from models.durations import DAY_S
+from models.geometry.usual_pose import usual_pose
 from service.api.cameras import CameraOut
 from service.api.middleware.dependencies import BodyDep, StateDep, WriteDep
 from service.api.middleware.pages import render
@@ -19,7 +21,13 @@ from service.formats.track import Clock, Limits
 from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
 from service.pages.registration_form import RegistrationForm
-from service.wording.typed_pose import Saying, judge_pose, judge_tracks, worst_first
+from service.wording.typed_pose import (
+    Saying,
+    judge_pose,
+    judge_tracks,
+    judge_typed,
+    worst_first,
+)
 
 router = APIRouter(include_in_schema=False)
 
@@ -103,7 +111,13 @@ def preview(body: PreviewBody) -> PreviewOut:
     wrong = {error.pointer[1:]: error.reason for error in read.errors}
     # What is needed and not there yet is no error while the form is filled in.
     errors = {name: reason for name, reason in wrong.items() if typed[name].strip()}
-    if read.lens is None or read.pose is None or read.pose.measured:
+    unknown = read.pose is None or bool(read.pose.measured)
+    if read.lens is not None and unknown and body.fields.form == "people":
+        pose = usual_pose({} if read.pose is None else read.pose.measured)
+        asked = judge_typed(read.lens.to_value(), pose)
+        says = worst_first([_of_measured(each) for each in asked])
+        return PreviewOut(picture="", ground="", says=says, errors=errors)
+    if read.lens is None or read.pose is None or unknown:
         return PreviewOut(picture="", ground="", says=[], errors=errors)
     lens, pose = read.lens.to_value(), read.pose.to_value()
     tracks = [np.array(track) for track in body.tracks if len(track) > 1]
@@ -127,6 +141,12 @@ def preview(body: PreviewBody) -> PreviewOut:
         says=worst_first(says),
         errors=errors,
     )
+
+
+def _of_measured(said: Saying) -> Saying:
+    """A remark beside the field that what was measured is typed into."""
+    typed = f"measured_{said.field}"
+    return replace(said, field=typed) if typed in RegistrationForm.model_fields else said
 
 
 @router.post("/ui/calibration")

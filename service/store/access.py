@@ -53,9 +53,9 @@ def valid(session: Session, now: datetime) -> Sequence[TokenRecord]:
     return session.scalars(query.order_by(TokenRecord.created_at, TokenRecord.id)).all()
 
 
-def count_valid(session: Session, now: datetime) -> int:
-    """The number of tokens that are valid."""
-    return count_where(session, *_valid(now))
+def count_valid(session: Session, now: datetime, besides: str) -> int:
+    """The number of tokens that are valid, besides one."""
+    return count_where(session, *_valid(now), TokenRecord.id != besides)
 
 
 def _valid(now: datetime) -> tuple[ColumnElement[bool], ...]:

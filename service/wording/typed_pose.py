@@ -52,9 +52,10 @@ def judge_pose(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> lis
     return found
 
 
-def judge_lens(lens: Intrinsics) -> list[Saying]:
-    """Remarks on a lens alone, of a camera whose pose nobody knows."""
-    return _through(lens)
+def judge_typed(lens: Intrinsics, pose: CameraPose) -> list[Saying]:
+    """What may be a slip of the pen in a lens and a pose: remarks that ask for a second look."""
+    says = judge_pose(lens, pose, typed_angles=True)
+    return [each for each in says if each.kind in (Tone.CRITICAL, Tone.WARNING)]
 
 
 def worst_first(sayings: Sequence[Saying]) -> list[Saying]:

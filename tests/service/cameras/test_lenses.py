@@ -92,6 +92,35 @@ def test_what_may_be_a_slip_is_asked_and_stored(http, changes, field, words):
     assert stored["intrinsics"]["fx"] == {**CAMERA, **changes}["intrinsics"]["fx"]
 
 
+@pytest.mark.parametrize(
+    ("lens", "measured", "field", "words"),
+    [
+        ({"fx": 8, "fy": 8}, {}, "fx", "millimetres"),
+        ({}, {"height_m": 784.0}, "height_m", "centimetres"),
+        ({}, {"tilt_deg": -20.0}, "tilt_deg", "sign"),
+    ],
+)
+def test_slips_are_asked_where_nobody_knows_the_pose(http, lens, measured, field, words):
+    intrinsics = CAMERA["intrinsics"] | lens
+    body = {"intrinsics": intrinsics} | ({"prior_pose": measured} if measured else {})
+    asked = {
+        each["field"]: each["text"] for each in http.post("/cameras", json=body).json()["questions"]
+    }
+    assert list(asked) == [field]
+    assert words in asked[field]
+    typed = {name: str(value) for name, value in intrinsics.items() if name != "distortion"}
+    typed |= {f"measured_{name}": str(value) for name, value in measured.items()}
+    (said,) = preview(http, form="people", **typed)["says"]
+    assert said["field"] == (f"measured_{field}" if measured else field)
+    assert words in said["text"]
+
+
+def test_a_fisheye_by_millimetres_is_asked(http):
+    camera = registered(http, {"fisheye": {"fx": 1.8}})
+    assert [each["field"] for each in camera["questions"]] == ["fx"]
+    assert registered(http, {"fisheye": {"fx": 600.0}})["questions"] == []
+
+
 def test_a_good_camera_draws_no_question(http):
     assert http.post("/cameras", json=CAMERA).json()["questions"] == []
 

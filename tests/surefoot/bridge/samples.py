@@ -67,7 +67,7 @@ ULTRALYTICS_TEXT = b"0 0.275 0.625 0.05 0.25 0.9 7\n2 0.5 0.5 0.1 0.1 0.8\n"
 ULTRALYTICS_SUMMARY = b"""[{"name": "person", "class": 0, "confidence": 0.9, "track_id": 7,
  "box": {"x1": 480.0, "y1": 540.0, "x2": 576.0, "y2": 810.0}}, {"name": "car", "class": 2}]"""
 
-# Frigate 0.16, tracked_object.py and api/event.py
+# Frigate 0.16: an MQTT event, and one of /api/events
 _PATH = b"[[[0.275, 0.75], 1795161600.25], [[0.3, 0.8], 1795161602.5]]"
 FRIGATE = (
     b'{"type": "end", "before": {}, "after": {"id": "1.5-a", "camera": "yard", "label": "person",'

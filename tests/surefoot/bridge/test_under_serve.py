@@ -1,8 +1,12 @@
 """`surefoot serve` with a broker runs the bridge, minds it and takes it along."""
 
+import contextlib
+
 import psutil
 import pytest
 
+from service.access.tokens import TokenSpec, make_token
+from service.store.engines.store import Store
 from tests.conftest import CAMERA, track
 from tests.running import wait_for
 from tests.surefoot.bridge.stand import Client5, broker, needs_mosquitto
@@ -19,7 +23,11 @@ def test_the_bridge_lives_with_serve_and_its_death_is_told(tmp_path, service):
     assert service.http.post("/cameras", json=CAMERA).status_code == 201
     with broker(tmp_path) as port:
         client = Client5(port, "surefoot/bridge/availability")
-        service.start_again(mqtt_url=f"mqtt://127.0.0.1:{port}", workers=0)
+        with contextlib.closing(Store(service.settings)) as store, store.write() as session:
+            ada = make_token(session, TokenSpec(name="ada", scopes=("read",)), None).text
+        # Tokens are needed, and nobody has made one for the bridge.
+        service.start_again(mqtt_url=f"mqtt://127.0.0.1:{port}", workers=0, auth="on")
+        service.http.headers["Authorization"] = f"Bearer {ada}"
 
         def stored():
             items = service.http.get("/cameras/corner/sources").json()["items"]
