@@ -159,7 +159,8 @@ table(
     *needed(Boolean, "shifted"),
     *optional(Double, "moved"),
     *optional(Boolean, "has_moved"),
-    *optional(DateTime, "other_at"),
+    *optional(DateTime, "other_at", "stood_at"),
+    *optional(LargeBinary, "stood_jpeg"),
 )
 table(
     "zones",

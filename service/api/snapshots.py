@@ -1,5 +1,6 @@
-"""`/cameras/{id}/snapshot`: a still image, off unless switched on, and the only picture kept."""
+"""`/cameras/{id}/snapshot`: still images, off unless switched on: the newest, and one of before."""
 
+import hashlib
 from datetime import datetime
 from typing import Annotated
 
@@ -70,13 +71,20 @@ def show(
     state: StateDep,
     session: ReadDep,
     if_none_match: Annotated[str | None, Header()] = None,
+    stood: Annotated[
+        bool, Query(description="the newest by which it stood at its prior pose")
+    ] = False,
 ) -> Response:
-    """The still image of a camera."""
-    record = snapshots.show_snapshot(session, state.settings, camera_id)
-    headers = {"ETag": f'"{record.sha256}"', "Cache-Control": "private, no-cache"}
+    """The newest still image of a camera, or the newest by which it stood."""
+    if stood:
+        jpeg = snapshots.show_stood(session, state.settings, camera_id)
+    else:
+        jpeg = snapshots.show_snapshot(session, state.settings, camera_id).jpeg
+    digest = hashlib.sha256(jpeg).hexdigest()
+    headers = {"ETag": f'"{digest}"', "Cache-Control": "private, no-cache"}
     if if_none_match == headers["ETag"]:
         return Response(status_code=304, headers=headers)
-    return Response(record.jpeg, media_type="image/jpeg", headers=headers)
+    return Response(jpeg, media_type="image/jpeg", headers=headers)
 
 
 @router.delete("", status_code=204)

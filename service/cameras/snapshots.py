@@ -87,7 +87,7 @@ def put_snapshot(
 
 
 def show_snapshot(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord:
-    """The still image of a camera.
+    """The newest still image of a camera.
 
     Raises:
         NotFoundError: there is no such camera, or none of it is kept.
@@ -99,6 +99,21 @@ def show_snapshot(session: Session, settings: Settings, camera_id: str) -> Snaps
     if record is None:
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
     return record
+
+
+def show_stood(session: Session, settings: Settings, camera_id: str) -> bytes:
+    """The newest still image of a camera by which it stood at its prior pose.
+
+    Raises:
+        NotFoundError: there is no such camera, or none of it is kept.
+        SwitchedOffError: pictures are not to be kept any more.
+    """
+    require_camera(session, camera_id)
+    require_snapshots(settings)
+    record = session.get(PictureRecord, camera_id)
+    if record is None or record.stood_jpeg is None:
+        raise NotFoundError(f"snapshot: none is kept of {camera_id!r} by which it stood")
+    return record.stood_jpeg
 
 
 def remove_snapshot(session: Session, camera_id: str) -> None:
@@ -119,6 +134,14 @@ def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> Snap
     if settings.snapshots != "pictures":
         return None
     return session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))
+
+
+def stood_at(session: Session, settings: Settings, camera_id: str) -> datetime | None:
+    """The time of the newest picture by which a camera stood; None where none may be shown."""
+    if settings.snapshots != "pictures":
+        return None
+    record = session.get(PictureRecord, camera_id)
+    return None if record is None else record.stood_at
 
 
 def newest_at(session: Session, camera_id: str) -> datetime | None:

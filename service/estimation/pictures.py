@@ -204,7 +204,9 @@ def save_picture(
             )
         )
     _cut_window(session, camera_id, new.last, compared.record)
-    session.merge(compared.record)
+    record = session.merge(compared.record)
+    if settings.snapshots == "pictures" and record.has_moved is False:
+        record.stood_jpeg, record.stood_at = new.snapshot.jpeg, record.taken_at
     _tell_fault(session, settings, camera_id, compared)
     return True
 

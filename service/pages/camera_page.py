@@ -19,7 +19,7 @@ from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
-from service.cameras.snapshots import snapshot_facts
+from service.cameras.snapshots import snapshot_facts, stood_at
 from service.cameras.sources import SourceView, rival_sources
 from service.cameras.undo import UNDO_WITHIN, last_answer
 from service.cameras.zones import ZonesView, view_zones
@@ -83,6 +83,7 @@ class CameraPage:
     activity: tuple[ActivityRecord, ...]
     sources: tuple[SourceView, ...]
     snapshot: SnapshotRecord | None
+    stood_at: datetime | None
     zones: ZonesView
     snapshots_allowed: bool
     newest_event_id: int
@@ -182,6 +183,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         activity=tuple(journal.newest_activity(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
         snapshot=snapshot_facts(session, settings, camera_id),
+        stood_at=stood_at(session, settings, camera_id),
         zones=view_zones(session, camera_id),
         snapshots_allowed=settings.snapshots == "pictures",
         newest_event_id=newest_event_id,
@@ -207,6 +209,7 @@ def show(
     clock = Clock(now=page.now, zone=zone)
     learned = page.pose.reference
     caller: Caller | None = request.state.caller
+    operates = caller is None or caller.may(TokenScope.OPERATE)
     proposal = page.pose.proposed
     history = History(
         items=load_history(session, camera_id, days, page.now),
@@ -232,7 +235,7 @@ def show(
             page.tracks,
             page.before,
             page.misplaced,
-            page.snapshot,
+            page.snapshot if operates else None,
             page.zones,
         ),
         proposed=moves.proposed_rows(proposal.pose, proposal.sd) if proposal else None,
@@ -246,7 +249,7 @@ def show(
         flags=_flags(page, clock),
         activity=[(entry, alert_words.entry_words(entry, clock)) for entry in page.activity],
         connect=None if learned.ready else how_to_connect(request, state.settings, camera_id),
-        operates=caller is None or caller.may(TokenScope.OPERATE),
+        operates=operates,
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,

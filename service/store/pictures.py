@@ -34,6 +34,7 @@ class PictureRecord(Record):
     the three; None where it matched none of the gallery. `moved` is how likely that is by the
     picture alone. `digest` is of its pixels, which were the same since `same_since`. `other_at` is
     when the newest picture was taken by which it was the other way round: stood, or had moved.
+    `stood_jpeg` is the newest picture by which it stood, where pictures are kept.
     """
 
     __tablename__ = "pictures"
@@ -54,6 +55,8 @@ class PictureRecord(Record):
     moved: Mapped[float | None]
     has_moved: Mapped[bool | None]
     other_at: Mapped[datetime | None]
+    stood_jpeg: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    stood_at: Mapped[datetime | None]
 
 
 def gallery(session: Session, prior_pose_id: int) -> Sequence[PictureReferenceRecord]:

@@ -154,6 +154,11 @@ root.addEventListener("change", (event) => {
   if (file) guarded(event.target, () => sendStill(file));
 });
 
+root.addEventListener("input", ({ target }) => {
+  if (target.dataset.act !== "compare") return;
+  target.closest("figure").style.setProperty("--shown", `${target.value}%`);
+});
+
 async function sendStill(file) {
   const answer = await fetch(`${path}/snapshot`, {
     method: "PUT", body: file, headers: { "Content-Type": file.type },

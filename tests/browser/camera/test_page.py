@@ -10,12 +10,14 @@ from PIL import Image
 from service.access.activity import note
 from service.enums import Activity
 from service.store.engines.store import Store
+from service.workers.estimate import compare_if_due
 from tests.browser.camera.conftest import URL
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.conftest import CAMERA
+from tests.models.pictures.given import seen_after, wall
 from tests.running import served
 from tests.service.bench import PRIOR, Bench, moved
-from tests.service.street import KNOCKED, Street
+from tests.service.street import KNOCKED, LENS, Street
 from tests.service.street import PRIOR as STREET_PRIOR
 
 pytestmark = pytest.mark.slow
@@ -83,6 +85,15 @@ def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_pat
     with served(tmp_path, migrated, snapshots="pictures", window_tracks=20) as server:
         server.http.post("/cameras", json=CAMERA).raise_for_status()
         bench = Bench(server.http, server.settings)
+        street, grey = Street(server.http, server.settings), wall(lens=LENS)
+
+        def see(pose):
+            Image.fromarray(seen_after(grey, STREET_PRIOR, pose, LENS)).save(tmp_path / "seen.png")
+            content, how = (tmp_path / "seen.png").read_bytes(), {"Content-Type": "image/png"}
+            server.http.put(f"{URL[3:]}/snapshot", content=content, headers=how).raise_for_status()
+            compare_if_due(street.context, "corner")
+
+        see(STREET_PRIOR)
         for _ in range(3):
             bench.see(moved(tilt_deg=5.0))
         page = browser.new_context(base_url=server.url).new_page()
@@ -94,6 +105,15 @@ def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_pat
         expect(page.locator(".picture image")).to_have_count(1)
         assert axe(page) == []
         shoot(page, "camera-still-image")
+        # Before and now lie over one another, once it was seen to stand and then to have moved.
+        see(KNOCKED)
+        page.reload()
+        expect(page.locator(".stills img")).to_have_count(2, timeout=30_000)
+        slider = page.get_by_label("How much of the picture before is shown")
+        slider.fill("20")
+        assert page.locator(".stills").get_attribute("style") == "--shown: 20%;"
+        assert axe(page) == []
+        shoot(page, "camera-before-and-now")
         page.get_by_role("button", name="Remove it").click()
         expect(page.locator(".picture image")).to_have_count(0)
         assert server.http.get("/cameras/corner/snapshot").status_code == 404
