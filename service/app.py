@@ -10,6 +10,7 @@ from fastapi import FastAPI
 from service.api import (
     activity,
     acts,
+    aim,
     alerts,
     cameras,
     client,
@@ -45,6 +46,7 @@ from service.cameras.tracks import Quota
 from service.job_queue import JobQueue
 from service.pages import (
     access,
+    aim_page,
     alerts_page,
     api_docs,
     camera_page,
@@ -103,6 +105,7 @@ def create_app(settings: Settings) -> FastAPI:
         cameras,
         sources,
         snapshots,
+        aim,
         ground,
         hints,
         zones,
@@ -119,6 +122,7 @@ def create_app(settings: Settings) -> FastAPI:
         fleet,
         alerts_page,
         camera_page,
+        aim_page,
         connecting,
         registration,
         tokens,

@@ -6,12 +6,13 @@ What the rest of the house asks of it stands here.
 from models.pictures.features import Features, describe
 from models.pictures.gallery import best_turn, renewed
 from models.pictures.health import PictureFault, judge
-from models.pictures.turn import Turn, turned_covariance, turned_pose
+from models.pictures.turn import Turn, aim_of, turned_covariance, turned_pose
 
 __all__ = [
     "Features",
     "PictureFault",
     "Turn",
+    "aim_of",
     "best_turn",
     "describe",
     "judge",

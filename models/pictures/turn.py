@@ -68,12 +68,17 @@ class Turn:
 
         Of a level camera these are the changes of heading, tilt and roll.
         """
-        forward, right = self.matrix[2], self.matrix[0]
-        return (
-            math.atan2(forward[0], forward[2]),
-            math.atan2(forward[1], math.hypot(forward[0], forward[2])),
-            math.atan2(right[1], math.hypot(right[0], right[2])),
-        )
+        return aim_of(self.matrix)
+
+
+def aim_of(matrix: Array) -> tuple[float, float, float]:
+    """How far a rotation (3, 3) turns a camera right, down and clockwise: see `Turn.aim`."""
+    forward, right = matrix[2], matrix[0]
+    return (
+        math.atan2(forward[0], forward[2]),
+        math.atan2(forward[1], math.hypot(forward[0], forward[2])),
+        math.atan2(right[1], math.hypot(right[0], right[2])),
+    )
 
 
 def turn_between(reference: Features, now: Features, intrinsics: Intrinsics) -> Turn | None:

@@ -129,7 +129,7 @@ async def start_threads(number: int) -> None:
 
 _MB = 1024 * 1024
 _TRACKS = re.compile(r"(/cameras/[^/]+/tracks|/ui/tracks)")
-_SNAPSHOT = re.compile(r"/cameras/[^/]+/snapshot")
+_SNAPSHOT = re.compile(r"/cameras/[^/]+/(snapshot|aim)")
 
 
 class AdmissionMiddleware:

@@ -73,6 +73,8 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "PUT /cameras/{camera_id}/hints",
         "PUT /cameras/{camera_id}/zones",
         "GET /cameras/{camera_id}/snapshot",
+        "POST /cameras/{camera_id}/aim",
+        "GET /ui/cameras/{camera_id}/aim",
         "PUT /cameras/{camera_id}/snapshot",
         "DELETE /cameras/{camera_id}/snapshot",
         "POST /cameras/{camera_id}/trainings",

@@ -11,6 +11,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from sqlalchemy import func, select
 
+from service.api import aim as aim_route
 from service.app import create_app
 from service.notifications.fetch import Fetched, FetchError
 from service.store import cameras
@@ -220,6 +221,39 @@ def test_a_camera_is_asked_for_its_picture_and_at_once_in_doubt(http, monkeypatc
     gone = {"snapshot_url": ""}
     after = http.patch("/cameras/corner", json=gone, headers={"If-Match": "*"}).json()
     assert (after["snapshot_url"], after["snapshot_error"]) == (None, None)
+
+
+def test_who_stands_on_the_ladder_is_told_where_to_turn_it(http, monkeypatch):
+    street = known_street(http, http.settings, 60)
+    nothing = http.post("/cameras/corner/aim").raise_for_status().json()
+    assert (nothing["right_deg"], nothing["by_picture"]) == (None, True)
+    street.keep_to_lanes(KNOCKED, 40)
+    street.look()
+    slow = http.post("/cameras/corner/aim").raise_for_status().json()
+    assert (slow["by_picture"], slow["good"]) == (False, False)
+    assert slow["up_deg"] == pytest.approx(5.0, abs=0.5)
+    assert slow["clockwise_deg"] == pytest.approx(4.0, abs=0.5)
+    http.post("/cameras/corner/pose/put-back", json={}).raise_for_status()
+    take(http)
+    street.look()
+    headers = {"Content-Type": "image/png"}
+    aim = {"headers": headers, "content": picture(TURNED)}
+    found = http.post("/cameras/corner/aim", **aim).raise_for_status().json()
+    assert found["up_deg"] == pytest.approx(3.0, abs=0.1)
+    # Four degrees of heading are fewer across the picture of a camera that looks down.
+    assert found["right_deg"] == pytest.approx(-3.7, abs=0.1)
+    assert not found["good"]
+    there = {"headers": headers, "content": picture(PRIOR, seed=3)}
+    assert http.post("/cameras/corner/aim", **there).json()["good"]
+    other = {"headers": headers, "content": picture(grey=wall(1, LENS))}
+    assert http.post("/cameras/corner/aim", **other).json()["right_deg"] is None
+    assert rows(street, PictureReferenceRecord) == 1
+    # Or it is asked of the camera.
+    address = {"snapshot_url": "http://camera.example/now.jpg"}
+    http.patch("/cameras/corner", json=address, headers={"If-Match": "*"}).raise_for_status()
+    asked = Fetched(content=picture(TURNED), media_type="image/png")
+    monkeypatch.setattr(aim_route, "fetch", lambda *_: asked)
+    assert http.post("/cameras/corner/aim").json()["up_deg"] == pytest.approx(3.0, abs=0.1)
 
 
 def test_an_address_that_is_none_is_refused(http):

@@ -1,0 +1,79 @@
+"""`/cameras/{id}/aim`: where to turn a camera, asked each second by who stands on the ladder."""
+
+import math
+from datetime import datetime
+from typing import Self
+
+from fastapi import APIRouter, Request
+from pydantic import BaseModel
+
+from service.api.middleware.dependencies import BodyDep, StateDep, media_type_of
+from service.cameras.aiming import Aim, aim_by_people, aim_by_picture, aim_target
+from service.errors import MalformedError
+from service.formats.still import read_still
+from service.notifications.fetch import FetchError, fetch
+
+router = APIRouter(prefix="/cameras/{camera_id}/aim", tags=["pose"])
+
+
+class AimOut(BaseModel):
+    """How far to turn it right, up and clockwise, as it sees it; null where nothing tells.
+
+    `by_picture` of now, or by the newest people, who take minutes. `good` within 0.2 deg.
+    """
+
+    right_deg: float | None
+    up_deg: float | None
+    clockwise_deg: float | None
+    good: bool
+    by_picture: bool
+    at: datetime | None
+
+    @classmethod
+    def of(cls, aim: Aim | None) -> Self:
+        """The body of an aim."""
+        if aim is None:
+            return cls(
+                right_deg=None,
+                up_deg=None,
+                clockwise_deg=None,
+                good=False,
+                by_picture=True,
+                at=None,
+            )
+        return cls(
+            right_deg=math.degrees(aim.right_rad),
+            up_deg=math.degrees(aim.up_rad),
+            clockwise_deg=math.degrees(aim.clockwise_rad),
+            good=aim.good,
+            by_picture=aim.by_picture,
+            at=aim.at,
+        )
+
+
+_IMAGE = {"schema": {"type": "string", "format": "binary"}}
+_DESCRIBED_BODY = {
+    "requestBody": {"required": False, "content": {"image/jpeg": _IMAGE, "image/png": _IMAGE}}
+}
+
+
+@router.post("", openapi_extra=_DESCRIBED_BODY)
+def show(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> AimOut:
+    """Where to turn the camera, by the picture that is sent, or is asked of its `snapshot_url`.
+
+    Nothing of it is kept. Without a picture it is by the newest people.
+    """
+    settings = state.settings
+    with state.store.read() as session:
+        target = aim_target(session, settings, camera_id)
+    if settings.snapshots == "off" or not target.gallery or not (body or target.snapshot_url):
+        return AimOut.of(aim_by_people(target))
+    media_type = media_type_of(request)
+    if not body:
+        try:
+            found = fetch(settings, str(target.snapshot_url))
+        except FetchError as error:
+            raise MalformedError(f"snapshot_url: {error}") from error
+        body, media_type = found.content, found.media_type
+    with state.stills.turn(settings.http_wait_s):
+        return AimOut.of(aim_by_picture(target, read_still(body, media_type)))

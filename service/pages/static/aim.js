@@ -1,0 +1,66 @@
+// Asks each second where to turn the camera; an arrow says it, and so do words.
+
+import { Refused, announce, call, guarded } from "./act.js";
+
+const root = document.getElementById("aim");
+const path = `/cameras/${encodeURIComponent(root.dataset.camera)}`;
+const EVERY_MS = 1000, PEOPLE_MS = 5000;
+const SMALL_DEG = 0.1; // not worth a word
+let last = null;
+
+/** How far to turn, in words: "0.8° more to the left, 0.3° up". */
+function inWords({ right_deg: right, up_deg: up, clockwise_deg: clockwise }) {
+  const parts = [
+    [right, "more to the right", "more to the left"],
+    [up, "up", "down"],
+    [clockwise, "clockwise", "counterclockwise"],
+  ];
+  const said = parts
+    .filter(([deg]) => Math.abs(deg) >= SMALL_DEG)
+    .map(([deg, plus, minus]) => `${Math.abs(deg).toFixed(1)}° ${deg > 0 ? plus : minus}`);
+  return said.join(", ") || "A little";
+}
+
+function show(aim) {
+  last = aim;
+  const known = aim.right_deg !== null;
+  root.dataset.state = !known ? "unknown" : aim.good ? "good" : "turn";
+  const words = !known ? "Nothing tells: the picture matches none of before." : aim.good ? "It looks where it did." : inWords(aim);
+  const place = document.getElementById("aim-words");
+  if (place.textContent !== words) place.textContent = words;
+  document.getElementById("aim-by").textContent = aim.by_picture
+    ? "By the picture of now."
+    : "By the newest people: it takes some of them to tell. Send pictures to see it at once.";
+  if (!known) return;
+  const deg = (Math.atan2(aim.right_deg, aim.up_deg) * 180) / Math.PI;
+  document.getElementById("aim-arrow").setAttribute("transform", `rotate(${deg.toFixed(0)})`);
+}
+
+async function ask() {
+  let wait = EVERY_MS;
+  try {
+    if (!document.hidden) {
+      const aim = await call("POST", `${path}/aim`);
+      show(aim);
+      if (!aim.by_picture) wait = PEOPLE_MS;
+    }
+  } catch (error) {
+    if (!(error instanceof Refused)) throw error;
+    root.dataset.state = "unknown";
+    document.getElementById("aim-words").textContent = error.message;
+    wait = PEOPLE_MS;
+  }
+  setTimeout(ask, wait);
+}
+
+const done = document.getElementById("aim-done");
+done.addEventListener("click", () =>
+  guarded(done, async () => {
+    const note = last?.right_deg == null ? "" : `aimed: ${last.good ? "within 0.2°" : `${inWords(last)} was left`}`;
+    await call("POST", `${path}/pose/put-back`, note ? { note } : {});
+    announce("It is put back. The next people, or pictures, tell.");
+    location.assign(`/ui${path}`);
+  }),
+);
+
+ask();
