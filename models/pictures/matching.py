@@ -1,6 +1,6 @@
 """Matches between two pictures' features: which are the same place by how they look."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -58,14 +58,14 @@ def lens_of(intrinsics: Intrinsics, width: int, height: int) -> Intrinsics:
             (intrinsics.cy, intrinsics.height, height),
         )
     ]
-    return Intrinsics(
+    return replace(
+        intrinsics,
         width=width,
         height=height,
         fx=intrinsics.fx * scale,
         fy=intrinsics.fy * scale,
         cx=shift[0],
         cy=shift[1],
-        distortion=intrinsics.distortion,
     )
 
 

@@ -87,6 +87,10 @@ def test_a_lens_is_scaled_and_cut_about_its_middle():
     cut = lens_of(wide, 480, 360)
     # Half as large, cut from 640 to 480: 20 px right of the middle are 10.
     assert (cut.fx, cut.cx, cut.cy) == (500, 239.5 + 10, 179.5)
+    fisheye = replace(wide, projection="fisheye", distortion=(0.1, 0.01, 0.0, 0.0))
+    assert lens_of(fisheye, 640, 360).rays(np.array([[639.5, 359.5]]))[0] == pytest.approx(
+        fisheye.rays(np.array([[1279.5, 719.5]]))[0], rel=1e-3
+    )
 
 
 def test_nothing_in_common_is_no_turn():

@@ -13,16 +13,16 @@ import pytest
 from service.settings import Settings
 from surefoot.bridge import frigate_history
 from surefoot.bridge import inbox as inbox_module
+from surefoot.bridge.broker import Address
 from surefoot.bridge.feeds import Topics
 from surefoot.bridge.frigate_history import History, HistoryError
 from surefoot.bridge.inbox import Inbox
 from surefoot.bridge.inward import Inward
+from surefoot.bridge.run import Bridge
 from surefoot.bridge.spool import Spool
-from tests.conftest import CAMERA
 from tests.running import wait_for
 from tests.surefoot.bridge.stand import (
     Client5,
-    bridged,
     broker,
     frigate_event,
     needs_mosquitto,
@@ -233,32 +233,55 @@ def test_an_address_that_is_none_is_refused(url):
         Settings(mqtt_frigate_url=url)
 
 
+@contextlib.contextmanager
+def running(spool, port, frigate):
+    """A bridge whose service is away: what it has kept stays in the spool."""
+    stopping, before = threading.Event(), threading.active_count()
+    bridge = Bridge(
+        address=Address(url=f"mqtt://127.0.0.1:{port}", client_id="bridge"), topics=TOPICS,
+        spool=spool, frigate_url=frigate.url, url="http://127.0.0.1:1", token=None,
+        discovery=None, version="0",
+    )  # fmt: skip
+    thread = threading.Thread(target=bridge.run, args=(stopping,))
+    thread.start()
+    yield
+    stopping.set()
+    thread.join()
+    # Its parts have the spool until they have seen that it stops.
+    wait_for(lambda: threading.active_count() <= before, every_s=0.02)
+
+
 @pytest.mark.slow
 @needs_mosquitto
-def test_who_ends_while_the_bridge_is_away_is_stored_once(tmp_path, service, frigate):
-    assert service.http.post("/cameras", json=CAMERA).status_code == 201
+def test_who_ends_while_the_bridge_is_away_is_kept(tmp_path, frigate, monkeypatch, caplog):
+    monkeypatch.setattr(frigate_history, "_SETTLE_S", 0.1)
+    monkeypatch.setattr(inbox_module, "_GATHER_S", 0.0)
+    caplog.set_level("INFO")
+    spool, now_s = Spool(tmp_path / "bridge.sqlite", 2**20), time.time()
 
-    def stored():
-        items = service.http.get("/cameras/corner/sources").json()["items"]
-        return sum(each["tracks"] for each in items)
+    def told(word):
+        return [record for record in caplog.records if record.message == word]
 
-    with broker(tmp_path) as port:
+    with broker(tmp_path) as port, contextlib.closing(spool):
         client = Client5(port)
-        now_s = time.time()
-        with bridged(tmp_path, port, service.url, frigate_url=frigate.url) as bridge:
+        with running(spool, port, frigate):
+            wait_for(lambda: told("frigate_asked"), every_s=0.02)
             publish_end(client, frigate, "before", now_s - 30.0)
-            wait_for(lambda: stored() == 1)
-            bridge.kill()
-            for n in range(3):
-                publish_end(client, frigate, f"away{n}", now_s - 20.0 + n)
-            bridge.start()
-            bridge.wait_connected(2)
+            wait_for(lambda: spool.waiting == 1, every_s=0.02)
+        for n in range(3):
+            publish_end(client, frigate, f"away{n}", now_s - 20.0 + n)
+        with running(spool, port, frigate):
+            wait_for(lambda: len(told("frigate_asked")) == 2, every_s=0.02)
             publish_end(client, frigate, "after", now_s - 10.0)
-            log = wait_for(lambda: (text := bridge.log.read_text()).count("frigate_asked") and text)
-            wait_for(lambda: stored() == 5)
-            # Frigate told of all five, and the service kept each once.
-            assert "kept=5" in log
+            found = set()
+            wait_for(lambda: found.update(kept_ids(spool)) or "after" in found, every_s=0.02)
         client.close()
+    assert found == {"before", "away0", "away1", "away2", "after"}
+    assert [record.kept for record in told("frigate_asked")] == [0, 4]
+
+
+def kept_ids(spool):
+    return [each["id"] for each in kept(spool)]
 
 
 def publish_end(client, frigate, name, start_s):
