@@ -58,6 +58,7 @@ OTHERS = {
     ("workers/upkeep/retention.py", "tracks"): "the name of a limit, for the log",
     ("api/ground.py", "pose"): "a tag of the API's description",
     ("api/maintenance.py", "maintenance"): "a tag of the API's description",
+    ("api/aim.py", "pose"): "a tag of the API's description",
     ("api/poses.py", "pose"): "a tag of the API's description",
     ("api/hints.py", "pose"): "a tag of the API's description",
     ("api/sources.py", "tracks"): "a tag of the API's description",

@@ -33,14 +33,8 @@ class AimOut(BaseModel):
     def of(cls, aim: Aim | None) -> Self:
         """The body of an aim."""
         if aim is None:
-            return cls(
-                right_deg=None,
-                up_deg=None,
-                clockwise_deg=None,
-                good=False,
-                by_picture=True,
-                at=None,
-            )
+            nothing = dict.fromkeys(("right_deg", "up_deg", "clockwise_deg", "at"))
+            return cls(**nothing, good=False, by_picture=True)
         return cls(
             right_deg=math.degrees(aim.right_rad),
             up_deg=math.degrees(aim.up_rad),

@@ -114,6 +114,13 @@ def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_pat
         assert page.locator(".stills").get_attribute("style") == "--shown: 20%;"
         assert axe(page) == []
         shoot(page, "camera-before-and-now")
+        page.get_by_role("link", name="Aim it live").first.click()
+        expect(page.locator("#aim-words")).to_have_text("5.0° up")
+        page.set_viewport_size({"width": 390, "height": 844})
+        assert axe(page) == []
+        shoot(page, "camera-aim")
+        page.go_back()
+        page.set_viewport_size({"width": 1280, "height": 720})
         page.get_by_role("button", name="Remove it").click()
         expect(page.locator(".picture image")).to_have_count(0)
         assert server.http.get("/cameras/corner/snapshot").status_code == 404
