@@ -48,6 +48,7 @@ SHIFTED_WIDER = 3.0  # times the standard deviations
 
 # Gallery
 MOST_REFERENCES = 8
+FIRST_FEATURES, FIRST_CELLS = 100, 24  # of 96 cells: fog and night have fewer, an empty wall too
 # Chosen by light: a reference of another light seldom matches
 STRONG_INLIERS = 150  # a match that needs no second opinion, and a reference that needs no renewal
 MOST_TRIED = 3  # references, of each picture: the likest in light first

@@ -69,6 +69,14 @@ def test_a_picture_that_is_not_known_to_be_of_this_view_becomes_no_reference():
         assert renewed(gallery, dark, wrong) == gallery
 
 
+def test_a_picture_that_shows_nothing_begins_no_gallery():
+    fog = np.full_like(wall(), 180)
+    lamp = fog.copy()
+    lamp[100:200, 100:200] = wall()[100:200, 100:200]
+    for grey in (fog, lamp):
+        assert renewed((), describe(grey), None) == ()
+
+
 def test_light_apart_is_nothing_of_the_same_picture():
     measures = describe(wall()).measures
     assert light_apart(measures, measures) == 0
