@@ -40,7 +40,7 @@ FEW_INLIERS = (
 FLOOR_RAD = math.radians(0.02)  # sd of each angle, of pictures of one pose at other hours
 FLOOR_LOG_ZOOM = 0.001
 LENS_SHARE = 0.01  # of the turn: by how much the focal length and the distortion may be wrong
-LENS_ACROSS = 0.2  # of that in the other directions
+LENS_ACROSS = 0.05  # of that in the other directions
 SHIFTED_MORE = 0.2  # of the inliers more by a shifted camera than by a turned one
 SHIFTED_LEAST = 12  # more, at least: of a few, lines explain some by chance
 MOST_DISPARITY_RAD = math.radians(10.0)  # between near and far things
@@ -48,6 +48,7 @@ SHIFTED_WIDER = 3.0  # times the standard deviations
 
 # Gallery
 MOST_REFERENCES = 8
+FIRST_FEATURES, FIRST_CELLS = 100, 24  # of 96 cells: fog and night have fewer, an empty wall too
 # Chosen by light: a reference of another light seldom matches
 STRONG_INLIERS = 150  # a match that needs no second opinion, and a reference that needs no renewal
 MOST_TRIED = 3  # references, of each picture: the likest in light first

@@ -53,7 +53,8 @@ def best_turn(gallery: Sequence[Features], now: Features, intrinsics: Intrinsics
 def renewed(gallery: Sequence[Features], now: Features, turn: Turn | None) -> tuple[Features, ...]:
     """The gallery with a picture that matched it, where its light is new or its match was weak.
 
-    The first stays. A picture that is much turned, or whose turn is not sure, becomes none.
+    The first stays: one that shows too little, in fog say, begins no gallery. A picture that is
+    much turned, or whose turn is not sure, becomes none.
 
     Args:
         gallery: its references, the first of which is what all are turned against.
@@ -62,7 +63,7 @@ def renewed(gallery: Sequence[Features], now: Features, turn: Turn | None) -> tu
     """
     kept = list(gallery)
     if not kept:
-        return (now,)
+        return (now,) if _may_be_first(now) else ()
     if turn is None or not _may_be_reference(turn):
         return tuple(kept)
     own = replace(
@@ -96,6 +97,13 @@ def light_apart(one: Measures, other: Measures) -> float:
 def bits_apart(one: str, other: str) -> int:
     """Bits of two hashes, in hexadecimal digits, that differ."""
     return (int(one, 16) ^ int(other, 16)).bit_count()
+
+
+def _may_be_first(now: Features) -> bool:
+    """True of a picture with enough to see in enough of it: all others are compared with it."""
+    size = np.array([now.width, now.height])
+    cells = np.unique((now.points_px / size * config.CELLS).astype(int), axis=0)
+    return len(now.points_px) >= config.FIRST_FEATURES and len(cells) >= config.FIRST_CELLS
 
 
 def _may_be_reference(turn: Turn) -> bool:

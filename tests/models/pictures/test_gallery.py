@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import combinations, product
 from math import degrees, radians
 
 import numpy as np
@@ -42,12 +43,16 @@ def test_a_creep_does_not_hide_in_renewals():
 
 def test_a_gallery_keeps_its_first_and_no_more_than_eight():
     first = describe(wall())
+    turn = best_turn((first,), first, LENS).turn
     gallery = renewed((), first, None)
-    for gain in np.linspace(0.1, 1.0, 14):
-        now = describe(lit(wall(), gain, lift=20 * (1 - gain)))
-        gallery = renewed(gallery, now, best_turn(gallery, now, LENS).turn)
+    for mean, spread in product(range(10, 250, 15), (20.0, 60.0)):
+        light = {"mean": float(mean), "spread": spread}
+        now = replace(first, measures=replace(first.measures, **light))
+        gallery = renewed(gallery, now, turn)
     assert gallery[0] is first
-    assert 3 <= len(gallery) <= config.MOST_REFERENCES
+    assert len(gallery) == config.MOST_REFERENCES
+    apart = [light_apart(a.measures, b.measures) for a, b in combinations(gallery[1:], 2)]
+    assert min(apart) >= config.LIKE_LIGHT
 
 
 def test_a_picture_that_is_not_known_to_be_of_this_view_becomes_no_reference():
@@ -62,6 +67,14 @@ def test_a_picture_that_is_not_known_to_be_of_this_view_becomes_no_reference():
         replace(turn, inliers=9),
     ):
         assert renewed(gallery, dark, wrong) == gallery
+
+
+def test_a_picture_that_shows_nothing_begins_no_gallery():
+    fog = np.full_like(wall(), 180)
+    lamp = fog.copy()
+    lamp[100:200, 100:200] = wall()[100:200, 100:200]
+    for grey in (fog, lamp):
+        assert renewed((), describe(grey), None) == ()
 
 
 def test_light_apart_is_nothing_of_the_same_picture():
