@@ -50,8 +50,10 @@ from service.pages import (
     camera_page,
     connecting,
     fleet,
+    health,
     registration,
 )
+from service.pages import webhooks as webhooks_page
 from service.settings import Settings
 from service.store.engines.store import Store
 
@@ -121,6 +123,8 @@ def create_app(settings: Settings) -> FastAPI:
         camera_page,
         connecting,
         registration,
+        health,
+        webhooks_page,
         tokens,
         access,
     ):
