@@ -3,10 +3,12 @@
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from sqlalchemy import update
 
 from service.store import webhooks, workers
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
+from service.store.tracks import TrackRecord
 from tests.conftest import track
 
 
@@ -57,8 +59,7 @@ def test_tracks_that_wait_are_told_since_when(corner, store):
     corner.post("/cameras/corner/tracks", json={"tracks": [track("1")]}).raise_for_status()
     assert banner(corner).strip() == ""  # for a minute, that is usual
     with store.write() as session:
-        session.connection().exec_driver_sql(
-            "UPDATE tracks SET received_at = ?",
-            ((datetime.now(UTC) - timedelta(minutes=5)).replace(tzinfo=None).isoformat(" "),),
+        session.execute(
+            update(TrackRecord).values(received_at=datetime.now(UTC) - timedelta(minutes=5))
         )
     assert "Tracks wait to be looked at, since" in banner(corner)
