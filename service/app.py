@@ -52,8 +52,10 @@ from service.pages import (
     camera_page,
     connecting,
     fleet,
+    health,
     registration,
 )
+from service.pages import webhooks as webhooks_page
 from service.settings import Settings
 from service.store.engines.store import Store
 
@@ -125,6 +127,8 @@ def create_app(settings: Settings) -> FastAPI:
         aim_page,
         connecting,
         registration,
+        health,
+        webhooks_page,
         tokens,
         access,
     ):

@@ -135,10 +135,12 @@ def test_it_comes_back_by_itself_and_has_missed_nothing(page, fleet, server):
     server.process.kill()
     server.process.wait(10)
     page.get_by_text("Reconnecting").wait_for()
+    page.get_by_text("does not answer. What you see is as of").wait_for()
     fleet.knock("alpha")
     server.start()
     page.locator("#row-alpha.drifting").wait_for()
     page.get_by_text("Live").wait_for()
+    page.get_by_text("does not answer").wait_for(state="detached")
 
 
 def test_what_happened_while_the_page_was_made_is_not_lost(page, fleet, server):

@@ -135,7 +135,7 @@ class Life:
         with self.store.write() as session:
             newest_pk = begin_look(session, camera_id)
             period = load_reference_period(session, self.settings, camera_id)
-            if period is not None:
+            if period is not None and period.trajectories:
                 learned = CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=some_site())
                 if self.stands.get(camera_id) == "far":  # what is said of it cannot be
                     values = {"tilt_rad": 0.1, "roll_rad": 0.0}

@@ -8,7 +8,7 @@ from hypothesis.stateful import (
     rule,
 )
 
-from service.enums import Answer
+from service.enums import Act, Answer
 from service.store.alerts import POSE_KINDS, answers_of
 from tests.service.life import WANTED, still
 from tests.service.life_events import LifeEvents, has_camera, names, notes, said, some
@@ -79,6 +79,22 @@ class LifeActs(LifeEvents):
             for camera_id in ids:
                 open_ = {a["kind"] for a in self.firing() if a["camera_id"] == camera_id}
                 assert not open_ & set(POSE_KINDS), "the pose was answered for, and alerts fire on"
+
+    @rule(act=st.sampled_from([Act.PUT_BACK, Act.RESET, Act.UNDO, Act.ACCEPT]), by=names)
+    def do_with_all(self, act: Act, by: str | None) -> None:
+        """One act with every camera at once; what one refuses stops no other."""
+        ids = sorted(self.life.stands)
+        if not ids:
+            return
+        body = said(ids=ids, act=act, by=by)
+        for item in self.call("POST", "/acts", json=body).json()["items"]:
+            if item["problem"] is not None:
+                assert item["problem"]["status"] == 409
+                assert act in (Act.UNDO, Act.ACCEPT)
+            elif act == Act.UNDO:
+                self.answered.discard(item["id"])
+            else:
+                self.answered.add(item["id"])
 
     @rule(n=some, by=names)
     def acknowledge(self, n: int, by: str | None) -> None:

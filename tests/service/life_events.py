@@ -52,6 +52,7 @@ class LifeEvents(RuleBasedStateMachine):
         self.bodies: dict[str, dict[str, str]] = {}  # of each camera, ETags and their bodies
         self.answered: set[str] = set()  # a person has spoken, and nothing was stored since
         self.looks: list[Look] = []
+        self.idle = False
 
     def teardown(self) -> None:
         self.life.stop()
@@ -87,6 +88,7 @@ class LifeEvents(RuleBasedStateMachine):
     @rule(camera_id=st.sampled_from((*CAMERAS, STREET)), learned=st.booleans())
     def register(self, camera_id: str, learned: bool) -> None:
         if camera_id in self.life.stands:
+            self.idle = True  # nothing happened, so there is nothing to compare
             return
         self.life.register(camera_id)
         self.bodies.pop(camera_id, None)

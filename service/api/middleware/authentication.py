@@ -41,7 +41,10 @@ COOKIE = "surefoot_session"
 PROXY_HEADER = "X-Surefoot-Proxy"
 _USE_IS_KEPT_EVERY_S = 60.0
 _TOLD_MORE = "/readyz"  # open, but what is wrong is not for strangers
-_PARTS = "/ui/fleet/"  # of a page: scripts fetch them, and nobody looks at them alone
+_PARTS = (
+    "/ui/fleet/",
+    "/ui/health/",
+)  # of a page: scripts fetch them, and nobody looks at them alone
 
 
 class GuardMiddleware:

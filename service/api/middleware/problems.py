@@ -32,6 +32,10 @@ FORESEEN = (
 # Nothing of ours shows in a page of another origin, and no browser guesses at a type: JSON with
 # text that a tracker made up is no page.
 _OF_ALL = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin"}
+# What a person can do about what a program reads in the detail.
+_FOR_PEOPLE = {
+    403: "You may look, but not do this. Whoever looks after the service can give you the right."
+}
 _MOST_ERRORS = 20  # of one body
 _BRIEF = reprlib.Repr()
 _BRIEF.maxstring = 80
@@ -79,7 +83,8 @@ def problem(request: Request, error: ServiceError) -> Response:
     if error.retry_after_s is not None:
         headers["Retry-After"] = str(max(1, round(error.retry_after_s)))
     if pages.wants_page(request):
-        page = pages.render(request, "problem.html", status, title=title, detail=error.detail)
+        said = _FOR_PEOPLE.get(status, error.detail)
+        page = pages.render(request, "problem.html", status, title=title, detail=said)
         page.headers.update(headers)
         return page
     content: dict[str, Any] = {

@@ -87,7 +87,7 @@ export function ask(id, { keep = false, send = async () => true } = {}) {
 }
 
 /** Say beside each field what is wrong with it, and below them what is of none. */
-function showErrors(form, error) {
+export function showErrors(form, error) {
   const places = [...form.querySelectorAll("[data-error]")];
   for (const place of places) {
     place.textContent = "";

@@ -59,6 +59,7 @@ async function leaveIfLoggedOut() {
 export function showState(state) {
   const place = document.getElementById("live");
   if (!place || (place.dataset.state === state && !place.hidden)) return;
+  document.dispatchEvent(new CustomEvent("live"));
   place.hidden = false;
   place.dataset.state = state;
   place.querySelector(".live-words").textContent = state === "on" ? "Live" : "Reconnecting…";

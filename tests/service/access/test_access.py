@@ -113,7 +113,11 @@ def test_each_scope_is_let_in_where_it_says_and_nowhere_else(closed, made, scope
 
 def test_who_may_not_register_is_not_asked_to(closed, made):
     """A viewer saw "Add a camera", and read "scope: this needs admin" after it."""
-    assert "/ui/register" not in closed.get("/", headers=made("read")).text
+    viewer = made("read")
+    assert "/ui/register" not in closed.get("/", headers=viewer).text
+    refused = closed.get("/ui/register", headers={**viewer, "Accept": "text/html"})
+    assert (refused.status_code, "scope:" in refused.text) == (403, False)
+    assert "You may look, but not do this." in refused.text
     assert "/ui/register" in closed.get("/", headers=made("admin")).text
 
 

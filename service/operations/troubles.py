@@ -1,0 +1,76 @@
+"""What is wrong with the service, for people: each trouble in a sentence, and since when."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+from sqlalchemy.orm import Session
+
+from service.settings import Settings
+from service.store import cameras, tracks, webhooks, workers
+from service.store.engines.dialects import now_in
+
+LONGEST_LAG = timedelta(seconds=60)
+_NAMED = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trouble:
+    """A trouble of the service as a whole, or of what it sends to."""
+
+    words: str
+    since: datetime | None
+
+
+def find_troubles(session: Session, settings: Settings) -> list[Trouble]:
+    """What keeps cameras from being looked at, or people from being told; by reading alone."""
+    return [
+        *_of_workers(session, settings),
+        *_of_the_queue(session),
+        *_of_webhooks(session),
+    ]
+
+
+def _of_workers(session: Session, settings: Settings) -> list[Trouble]:
+    known = workers.every(session)
+    heard = max((each.heartbeat_at for each in known if not each.lost), default=None)
+    found = [
+        Trouble(words=f"The worker {each.name} {each.trouble}", since=each.heartbeat_at)
+        for each in known
+        if each.trouble is not None
+    ]
+    if heard is None:
+        return [Trouble(words="No worker runs: no camera is looked at", since=None), *found]
+    # By the database's clock, as heartbeats are; one of the future is no sign of life either.
+    if abs((now_in(session) - heard).total_seconds()) >= settings.worker_lost_s:
+        silent = Trouble(words="No worker is heard of: no camera is looked at", since=heard)
+        return [silent, *found]
+    return found
+
+
+def _of_the_queue(session: Session) -> list[Trouble]:
+    failing = cameras.failing(session)
+    names = {camera.id for camera in failing}
+    came = [at for i, (_, at) in tracks.unseen_since(session).items() if i not in names]
+    oldest = min(came, default=None)
+    found = []
+    if oldest is not None and datetime.now(UTC) - oldest > LONGEST_LAG:
+        found.append(Trouble(words="Tracks wait to be looked at", since=oldest))
+    if failing:
+        some = ", ".join(camera.id for camera in failing[:_NAMED])
+        rest = f" and {len(failing) - _NAMED} more" if len(failing) > _NAMED else ""
+        since = failing[0].estimate_failing_since
+        found.append(Trouble(words=f"Looks at {some}{rest} fail", since=since))
+    return found
+
+
+def _of_webhooks(session: Session) -> list[Trouble]:
+    # By their names alone: an address often holds a secret.
+    return [
+        Trouble(
+            words=f"The webhook “{record.name or record.id}” "
+            + ("takes nothing" if record.enabled else "is switched off, as it failed for long"),
+            since=record.failing_since,
+        )
+        for record in webhooks.every(session)
+        if record.failing_since is not None
+    ]

@@ -1,0 +1,53 @@
+// Webhooks: tested, switched off and on, given a secret, removed, added; the page then loads anew.
+
+import { call, confirmed } from "./act.js";
+import { listen } from "./alert_acts.js";
+import { showErrors } from "./dialogs.js";
+
+const root = document.getElementById("main");
+const path = (button) => `/webhooks/${button.closest("[data-id]").dataset.id}`;
+const nameOf = (button) => button.closest("[data-id]").dataset.name;
+
+function showSecret(secret) {
+  if (!secret) return location.reload(); // an Alertmanager has none
+  document.getElementById("secret-text").textContent = secret;
+  document.getElementById("secret").hidden = false;
+  document.getElementById("secret").scrollIntoView({ block: "center" });
+}
+
+async function then(what) {
+  await what;
+  location.reload();
+}
+
+listen(root, {
+  test: (_, button) => then(call("POST", `${path(button)}/test`)),
+  off: (_, button) => then(call("PATCH", path(button), { enabled: false })),
+  on: (_, button) => then(call("PATCH", path(button), { enabled: true })),
+  replay: ({ delivery }) => then(call("POST", `/deliveries/${delivery}/replay`)),
+
+  async secret(_, button) {
+    const detail = "For a day, messages are signed with the old one, too. Then it counts no more.";
+    if (await confirmed({ title: `A new secret for ${nameOf(button)}?`, detail, yes: "Make it" })) {
+      showSecret((await call("POST", `${path(button)}/secret`)).secret);
+    }
+  },
+
+  async remove(_, button) {
+    const detail = "Nobody is told there any more, and what was sent is forgotten.";
+    if (await confirmed({ title: `Remove ${nameOf(button)}?`, detail, yes: "Remove it" })) {
+      await then(call("DELETE", path(button)));
+    }
+  },
+});
+
+const form = document.getElementById("add");
+form.addEventListener("submit", async (event) => {
+  event.preventDefault();
+  showErrors(form, null);
+  try {
+    showSecret((await call("POST", "/webhooks", Object.fromEntries(new FormData(form)))).secret);
+  } catch (error) {
+    showErrors(form, error);
+  }
+});

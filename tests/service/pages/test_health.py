@@ -1,0 +1,65 @@
+"""What is wrong with the service is said on every page, and since when."""
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from sqlalchemy import update
+
+from service.store import webhooks, workers
+from service.store.cameras import CameraRecord
+from service.store.engines.store import Store
+from service.store.tracks import TrackRecord
+from tests.conftest import track
+
+
+@pytest.fixture
+def store(settings):
+    made = Store(settings)
+    yield made
+    made.close()
+
+
+def banner(http):
+    return http.get("/ui/health/banner").text
+
+
+def test_a_banner_says_what_is_wrong_and_since_when(corner, store):
+    """`/readyz` at 503 and a webhook that failed for minutes stood nowhere."""
+    assert "No worker runs: no camera is looked at." in banner(corner)
+    now = datetime.now(UTC)
+    with store.write() as session:
+        workers.add(session, "one", 1, now)
+    assert banner(corner).strip() == ""
+    assert "All is well" in corner.get("/ui/health").text
+    hook = corner.post("/webhooks", json={"url": "https://1.1.1.1/x", "name": "on call"}).json()
+    corner.post("/cameras/corner/tracks", json={"tracks": [track("1")]}).raise_for_status()
+    ago = now - timedelta(minutes=7)
+    with store.write() as session:
+        session.get(workers.WorkerRecord, "one").heartbeat_at = ago
+        record = session.get(webhooks.WebhookRecord, hook["id"])
+        record.failing_since, record.last_error = ago, "timed out at https://1.1.1.1/x"
+        camera = session.get(CameraRecord, "corner")
+        camera.estimate_failing_since, camera.estimate_error = ago, "MemoryError"
+    said = banner(corner)
+    assert (
+        f'No worker is heard of: no camera is looked at, since <time datetime="{ago.isoformat()}'
+        in said
+    )
+    assert "The webhook “on call” takes nothing, since" in said
+    assert "Looks at corner fail, since" in said
+    page = corner.get("/ui/health").text
+    assert "MemoryError" in page
+    assert "1.1.1.1" not in said + page  # an address may hold a secret, and many read this
+    assert "Takes nothing since" in corner.get("/ui/webhooks").text
+
+
+def test_tracks_that_wait_are_told_since_when(corner, store):
+    with store.write() as session:
+        workers.add(session, "one", 1, datetime.now(UTC))
+    corner.post("/cameras/corner/tracks", json={"tracks": [track("1")]}).raise_for_status()
+    assert banner(corner).strip() == ""  # for a minute, that is usual
+    with store.write() as session:
+        session.execute(
+            update(TrackRecord).values(received_at=datetime.now(UTC) - timedelta(minutes=5))
+        )
+    assert "Tracks wait to be looked at, since" in banner(corner)
