@@ -160,6 +160,7 @@ table(
     *optional(Double, "moved"),
     *optional(Boolean, "has_moved"),
     *optional(DateTime, "other_at", "stood_at"),
+    *needed(JSON, "agreement"),
     *optional(LargeBinary, "stood_jpeg"),
 )
 table(

@@ -33,7 +33,7 @@ from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode, some
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
-from service.store import estimates, journal, references
+from service.store import estimates, journal, pictures, references
 from service.store.alerts import MOVED_KINDS
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
@@ -98,6 +98,9 @@ def save_estimate(
             reference.window_from_s = finding.change.ended_s
             reference.changed_after_s, reference.changed_s = _change_of(evidence, finding.change)
         history = history_of(session, reference)
+        picture = finding.picture
+        if finding.people_moved is not None and picture and not picture.was_told(history.last):
+            pictures.note_agreement(session, camera.id, people_moved=finding.people_moved)
         judgement = _judge(reference, history, evidence, finding, drift, camera.frame_rate_hz)
         record = _record(reference, evidence, finding, drift, judgement)
         pose = pose_after(drift, evidence.prior)

@@ -12,6 +12,7 @@ import numpy as np
 
 from models.errors import CheckpointError
 from models.geometry.rotation import Array
+from models.monitoring.verdict import LIKELY
 from models.pose import (
     CREEP_SHARE,
     AlarmRate,
@@ -104,7 +105,8 @@ class Finding:
     tracks after the change, or of all where these are too few; None where there is no chart. Where
     it alarms and the pose does not rule it out, the `tracks` are those that it is of. `creep` is
     what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
-    `picture` is the newest one, whether or not it counts beside the tracks.
+    `picture` is the newest one; where it counts beside the tracks, `people_moved` is whether these
+    alone say that the camera moved.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
     """
@@ -120,6 +122,7 @@ class Finding:
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
     picture: SeenPicture | None = None
+    people_moved: bool | None = None
     pieces: Reason | None = None
     failures: Reasons = ()
     last: LastPoseRecord | None = None
@@ -170,7 +173,10 @@ def compute_finding(
     judged = partial(since_alarm, found, observed, site, reading)
     found = failures.unless_failed("chart", judged) or found
     picture = _picture_of(evidence, found, reading)
-    if picture is not None:  # it speaks of the same as the chart, by which the prior may be raised
+    people_moved = None
+    if picture is not None:
+        people_moved = found.posterior.moved >= LIKELY
+        # It speaks of the same as the chart, by which the prior may be raised.
         found = replace(found, moved_prior=moved_prior, picture=picture.evidence)
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
@@ -186,6 +192,7 @@ def compute_finding(
         tracks=seen,
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         picture=evidence.picture,
+        people_moved=people_moved,
         pieces=walks.reason,
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),

@@ -150,6 +150,7 @@ def _result(
         same_since=last.same_since if same and last else snapshot.taken_at,
         shifted=turn is not None and turn.shifted,
         has_moved=None if last is None else last.has_moved,
+        agreement={} if new.last is None else new.last.agreement,
         other_at=None if last is None else last.other_at,
     )
     if turn is None:

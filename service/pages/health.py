@@ -11,7 +11,7 @@ from service.api.middleware.pages import render
 from service.enums import TokenScope
 from service.notifications.webhooks import list_webhooks
 from service.operations.troubles import find_troubles
-from service.store import cameras, tracks, workers
+from service.store import cameras, pictures, tracks, workers
 from service.wording.times import Clock
 
 router = APIRouter(include_in_schema=False)
@@ -32,6 +32,7 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
         oldest=min(came, default=None),
         failing=cameras.failing(session),
         webhooks=list_webhooks(session),
+        agreement=pictures.agreement(session),
         administers=caller is None or caller.may(TokenScope.ADMIN),
     )
 

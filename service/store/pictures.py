@@ -1,5 +1,6 @@
 """What the pictures of a camera tell: the gallery by light, and the newest one's result."""
 
+from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
@@ -34,7 +35,9 @@ class PictureRecord(Record):
     the three; None where it matched none of the gallery. `moved` is how likely that is by the
     picture alone. `digest` is of its pixels, which were the same since `same_since`. `other_at` is
     when the newest picture was taken by which it was the other way round: stood, or had moved.
-    `stood_jpeg` is the newest picture by which it stood, where pictures are kept.
+    `agreement` counts pictures by what they say and people say beside them: `stood/moved` are those
+    of a camera that stood by the picture and moved by people. `stood_jpeg` is the newest picture by
+    which it stood, where pictures are kept.
     """
 
     __tablename__ = "pictures"
@@ -55,6 +58,7 @@ class PictureRecord(Record):
     moved: Mapped[float | None]
     has_moved: Mapped[bool | None]
     other_at: Mapped[datetime | None]
+    agreement: Mapped[dict[str, Any]] = mapped_column(default=dict)
     stood_jpeg: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     stood_at: Mapped[datetime | None]
 
@@ -72,6 +76,22 @@ def forget(session: Session, camera_id: str) -> None:
     """Delete all that pictures have told of a camera."""
     for record in (PictureReferenceRecord, PictureRecord):
         session.execute(delete(record).where(record.camera_id == camera_id))
+
+
+def note_agreement(session: Session, camera_id: str, *, people_moved: bool) -> None:
+    """Count what people say beside the newest picture of a camera."""
+    record = session.get(PictureRecord, camera_id)
+    if record is not None and record.has_moved is not None:
+        named = "/".join("moved" if each else "stood" for each in (record.has_moved, people_moved))
+        record.agreement = record.agreement | {named: record.agreement.get(named, 0) + 1}
+
+
+def agreement(session: Session) -> Counter[str]:
+    """The counts of all cameras."""
+    found: Counter[str] = Counter()
+    for counts in session.scalars(select(PictureRecord.agreement)):
+        found.update(counts)
+    return found
 
 
 def keep_only(session: Session, camera_id: str, ids: Sequence[int]) -> None:

@@ -112,6 +112,9 @@ def test_a_picture_that_says_it_stands_makes_other_paths_a_changed_site(http):
     street = known_street(http, http.settings, 60)
     take(http, before_s=7200)
     street.look()
+    take(http, before_s=7100)
+    street.keep_to_lanes(PRIOR, 20)
+    street.look()
     street.clock_s += 12_000
     street.keep_to_lanes(KNOCKED, 40)
     take(http)
@@ -119,6 +122,8 @@ def test_a_picture_that_says_it_stands_makes_other_paths_a_changed_site(http):
     assert found["state"] == "ok"
     assert found["reason_code"] == "site_changed"
     assert street.alerts() == []
+    # It is kept how people compare with pictures.
+    assert "people said that one moved 1 time (50.0 %)" in http.get("/ui/health").text
 
 
 def test_a_picture_of_before_the_people_counts_no_more(http):
