@@ -106,7 +106,7 @@ def test_a_loop_of_detections_is_stored_as_tracks(server, soon):
         c.add(1, (150, 100, 180, 200), start_s + 60)  # somebody else, long after
     assert c.posted == Counter(accepted=2, refused=1)  # who was seen once is too short
     assert c.waiting == 0
-    assert abs(c.clock_ahead_s) < 3
+    assert abs(c.clock_ahead_s) < 30  # of one machine: what a busy one takes to answer
     (source, name, points, boxes), _ = stored(server)
     assert (source, name) == ("loop", "1")
     assert boxes[0].tolist() == [300.5, 200.5, 360.5, 400.5]  # of twice as many pixels

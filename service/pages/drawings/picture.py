@@ -153,10 +153,10 @@ def picture_svg(
             f'text-anchor="middle" font-size="{lens.width / 24:.0f}">nothing but sky</text>'
         )
     parts += over
-    for kind, some in (("then", before), ("now" if before else "", tracks)):
+    for kind, some in (("track then", before), ("track now" if before else "track", tracks)):
         if some:
             drawn = path_data(some, picture_frame(lens))
-            parts.append(f'<path class="track {kind}" d="{drawn}"/>')
+            parts.append(f'<path class="{kind}" d="{drawn}"/>')
     return svg("picture", f"-0.5 -0.5 {lens.width} {lens.height}", label, parts)
 
 

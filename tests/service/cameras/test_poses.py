@@ -206,7 +206,7 @@ def test_a_reset_takes_the_camera_to_be_back_at_its_prior_pose(bench):
     assert body["pose"]["tilt_deg"] == pytest.approx(22.0)
     assert body["reference"]["walking_speed_mps"] is None
     assert {alert["kind"] for alert in bench.alerts()} == {"drift"}
-    assert {(a["outcome"], a["resolved_by"]) for a in bench.alerts()} == {("put_back", "Ada")}
+    assert {(a["outcome"], a["resolved_by"]) for a in bench.alerts()} == {("relearned", "Ada")}
     bench.see(PRIOR, people=7)
     assert bench.pose()["reference"]["tracks"] == 7
     assert bench.http.post("/cameras/corner/reference/reset").status_code == 200  # no body needed

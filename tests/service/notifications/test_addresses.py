@@ -160,14 +160,14 @@ def certified(tmp_path, monkeypatch):
         capture_output=True,
     )  # fmt: skip
     monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
-    send._tls.cache_clear()
+    send.tls_context.cache_clear()
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(certificate, key)
     asked = []
     context.sni_callback = lambda _, name, __: asked.append(name)
     with receiver(tls=context) as inner:
         yield inner.url.split(":")[2].split("/")[0], inner, asked
-    send._tls.cache_clear()
+    send.tls_context.cache_clear()
 
 
 def test_tls_is_of_the_name_though_the_connection_is_to_an_address(certified, monkeypatch):
@@ -193,8 +193,8 @@ def test_a_proxy_of_the_environment_is_not_asked(monkeypatch):
 
 def test_authorities_that_cannot_be_read_fail_an_attempt_and_no_job(monkeypatch):
     monkeypatch.setenv("SSL_CERT_FILE", "/nowhere/at/all.pem")
-    send._tls.cache_clear()
+    send.tls_context.cache_clear()
     outcome = post("https://127.0.0.1:9/", {}, "{}", LOOPBACK)
-    send._tls.cache_clear()
+    send.tls_context.cache_clear()
     assert outcome.status_code is None
     assert "FileNotFoundError" in outcome.error
