@@ -95,10 +95,18 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()
     }
+    moved = (record.evidence or {}).get("zones") or {}
+    body["zones"] = moved.get("zones")
+    body["mended_zones"] = mended_zones(record.camera_id, moved["form"]) if moved else None
     body["since"] = {"after": body.pop("changed_after"), "before": body["changed_at"]}
     body["acknowledged"] = record.acknowledged_at is not None
     body["silenced"] = record.is_silenced(datetime.now(UTC))
     return body
+
+
+def mended_zones(camera_id: str | None, form: str | None) -> str:
+    """The path of zones as they should lie now, in the form that they came in."""
+    return f"/cameras/{camera_id}/zones" + (f"?format={form}" if form else "")
 
 
 def json_time(at: datetime) -> str:
