@@ -132,14 +132,19 @@ class MovedZoneOut(BaseModel):
     false_counts: int | None
 
 
-class AlertDetail(AlertOut):
-    """An alert, what its move is to zones, and what was done with it, oldest first.
+class MendedZonesOut(BaseModel):
+    """Where zones are as they should lie now, in the form that they came in, and what to do."""
 
-    `mended_zones` is where zones are as they should lie now, in the form that they came in.
-    """
+    path: str
+    format: str | None
+    how: str
+
+
+class AlertDetail(AlertOut):
+    """An alert, what its move is to zones, and what was done with it, oldest first."""
 
     zones: list[MovedZoneOut] | None
-    mended_zones: str | None
+    mended_zones: MendedZonesOut | None
     acts: list[ActOut] = []
 
 

@@ -18,6 +18,7 @@ from service.store import webhooks
 from service.store.alerts import AlertRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
+from service.wording.zones import apply_words
 
 _ALERT_FIELDS = (
     *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
@@ -104,9 +105,10 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
     return body
 
 
-def mended_zones(camera_id: str | None, form: str | None) -> str:
-    """The path of zones as they should lie now, in the form that they came in."""
-    return f"/cameras/{camera_id}/zones" + (f"?format={form}" if form else "")
+def mended_zones(camera_id: str | None, form: str | None) -> dict[str, Any]:
+    """Where zones are as they should lie now, in the form that they came in, and what to do."""
+    path = f"/cameras/{camera_id}/zones" + (f"?format={form}" if form else "")
+    return {"path": path, "format": form, "how": apply_words(form)}
 
 
 def json_time(at: datetime) -> str:

@@ -42,7 +42,7 @@ from service.wording import moves
 from service.wording.camera import CameraFacts
 from service.wording.reasons import in_words
 from service.wording.times import Clock
-from service.wording.zones import corner_words, count_words, zone_words
+from service.wording.zones import apply_words, corner_words, count_words, zone_words
 
 _TRACKS = 120  # more are a carpet
 _ALERTS, _ACTIVITY, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 40, 5, 20, 5
@@ -241,6 +241,7 @@ def show(
         ),
         proposed=moves.proposed_rows(proposal.pose, proposal.sd) if proposal else None,
         zones=_zone_rows(page.zones, _counts(page)),
+        applied=apply_words(page.zones.record.form if page.zones.record else None),
         frigate=_frigate(state.settings, page.zones),
         parameters=moves.parameter_rows(
             page.camera.prior_pose, page.pose.pose, page.pose.status.estimate

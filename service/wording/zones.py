@@ -6,6 +6,12 @@ from typing import Any
 from models.quantiles import Z90
 from service.enums import ZoneOn
 
+_APPLIED = {
+    "frigate": (
+        "Have them in place of this camera's in Frigate's configuration, and restart Frigate."
+    ),
+    "axis": "Have the camera take them by setConfiguration.",
+}
 _MANY = 0.995  # of a share that is told as whole
 
 
@@ -49,6 +55,11 @@ def moved_zone_words(moved: Mapping[str, Any]) -> str:
     words = zone_words(ZoneOn(moved["on"]), overlap=moved["overlap"], in_view=moved["in_view"])
     counted = count_words(moved["crossed"], moved["missed"], moved["false_counts"])
     return f"{words}; {counted}" if counted else words
+
+
+def apply_words(form: str | None) -> str:
+    """How zones that are mended come to count in the system that they are of, in a sentence."""
+    return _APPLIED.get(form or "", "Have them in place of those that were drawn.")
 
 
 def corner_words(worst_px: float | None) -> str:
