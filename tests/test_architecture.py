@@ -47,6 +47,7 @@ PUBLIC_MODELS = {
     "models.durations": "hours and days in seconds",
     "models.effort": "the CPU time that a look may take",
     "models.errors": "what a calibration may fail by",
+    "models.geometry.crossings": "who crosses a line, and who would if it lay elsewhere",
     "models.geometry.footprint": "the ground in the picture",
     "models.geometry.ground": "feet, horizons and people who are placed wrong",
     "models.geometry.hints": "what a person marks in a picture",

@@ -27,7 +27,15 @@ from service.api.schemas import (
 )
 from service.cameras import decisions
 from service.degrees import in_degrees
-from service.enums import AlertActivity, AlertKind, AlertState, Answer, Outcome, Severity
+from service.enums import (
+    AlertActivity,
+    AlertKind,
+    AlertState,
+    Answer,
+    Outcome,
+    Severity,
+    ZoneOn,
+)
 from service.errors import MalformedError
 from service.notifications.outbox import alert_body, json_time
 from service.store.access import name_in
@@ -107,9 +115,36 @@ class ActOut(Out):
     note: str | None
 
 
-class AlertDetail(AlertOut):
-    """An alert, and what was done with it, oldest first."""
+class MovedZoneOut(BaseModel):
+    """A zone of a camera that moved, by the newest estimate, as long as nobody mends its drawing.
 
+    `overlap` is the share that still lies where it was drawn, `in_view` the share in the picture.
+    Of a line, by the people of that estimate: how many `crossed` it where it should lie now, how
+    many of them it `missed` where it was drawn, and its `false_counts` there; null of an area.
+    """
+
+    id: str
+    on: ZoneOn
+    overlap: float
+    in_view: float
+    crossed: int | None
+    missed: int | None
+    false_counts: int | None
+
+
+class MendedZonesOut(BaseModel):
+    """Where zones are as they should lie now, in the form that they came in, and what to do."""
+
+    path: str
+    format: str | None
+    how: str
+
+
+class AlertDetail(AlertOut):
+    """An alert, what its move is to zones, and what was done with it, oldest first."""
+
+    zones: list[MovedZoneOut] | None
+    mended_zones: MendedZonesOut | None
     acts: list[ActOut] = []
 
 

@@ -9,14 +9,7 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.outlines import (
-    MovedOutline,
-    Outline,
-    View,
-    moved_outline,
-    within_picture,
-)
-from models.geometry.pose import CameraPose
+from models.geometry.outlines import MovedOutline, View, moved_outline, within_picture
 from models.geometry.rotation import Array
 from service.access.activity import note
 from service.cameras.cameras import require_camera
@@ -69,18 +62,18 @@ def view_zones(session: Session, camera_id: str) -> ZonesView:
     lens = require_camera(session, camera_id).intrinsics
     record, held = zones.of_camera(session, camera_id), held_pose(session, camera_id)
     now = View(intrinsics=lens, pose=held.pose)
-    drawn = now if record is None else _view_of(record)
+    drawn = now if record is None else record.view
     if held.assumed:  # nobody knows a pose that it could have left
         now = View(intrinsics=lens, pose=drawn.pose)
     moved = drawn != now
     covariance = None if record is None else _between(session, record, held, moved=moved)
     found = []
+    outlines = {} if record is None else record.outlines
     for zone in () if record is None else zones_of_record(record):
-        corners = np.array(zone.corners, dtype=np.float64)
-        outline = Outline(corners=corners, drawn=drawn, on_ground=zone.on == ZoneOn.GROUND)
+        outline = outlines[zone.id]
         placed = moved_outline(outline, now, covariance)
         if not moved:
-            placed = _unmoved(corners, placed)
+            placed = _unmoved(outline.corners, placed)
         found.append(ZoneView(zone=zone, now=placed))
     return ZonesView(
         camera_id=camera_id,
@@ -202,11 +195,6 @@ def _check_seen(zone: Zone, lens: Intrinsics) -> None:
     if beyond.any():
         corner = zone.corners[int(np.argmax(beyond))]
         raise MalformedError.of_field("zones", f"{zone.id}: {lens.beyond_words}, got {corner}")
-
-
-def _view_of(record: ZonesRecord) -> View:
-    lens = {**record.intrinsics, "distortion": tuple(record.intrinsics["distortion"])}
-    return View(intrinsics=Intrinsics(**lens), pose=CameraPose(**record.pose))
 
 
 def _between(session: Session, record: ZonesRecord, held: HeldPose, *, moved: bool) -> Array | None:

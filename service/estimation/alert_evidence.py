@@ -37,6 +37,7 @@ def alert_evidence(finding: Finding, prior: CameraPose) -> dict[str, Any]:
             "walking_groups": chart.walking_groups,
         },
         "creep": None if creep is None else {"statistic": creep.statistic, "level": creep.level},
+        "zones": None if finding.zones is None else asdict(finding.zones),
     }
 
 

@@ -289,6 +289,7 @@ def update_alerts(
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind."""
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
+    of_no_move = {**evidence, "zones": None}
     if not verdict.drifting:
         unsure = judgement.state == PoseState.UNSURE
         for kind in firing - {AlertKind.UNSURE} if unsure else firing:
@@ -303,7 +304,7 @@ def update_alerts(
                 identifiable_drift(drift),
                 None,
                 reasons=judgement.reasons,
-                evidence=evidence,
+                evidence=of_no_move,
             )
         return
     # What was named a clock fault stays one until an angle has drifted too.
@@ -323,7 +324,7 @@ def update_alerts(
             judgement.since,
             reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
             changed_after=judgement.after,
-            evidence=evidence,
+            evidence=of_no_move if clock else evidence,
         )
 
 

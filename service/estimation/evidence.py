@@ -18,7 +18,7 @@ from models.walking.config import FEWEST_WALKERS
 from service.estimation.pictures import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
-from service.store import alerts, cameras, estimates, references, tracks, trainings, windows
+from service.store import alerts, cameras, estimates, references, tracks, trainings, windows, zones
 from service.store.cameras import CameraRecord
 from service.store.look_budget import LookBudget
 from service.store.references import (
@@ -30,6 +30,7 @@ from service.store.references import (
 from service.store.tracks import StoredTrack, seen_of, trajectory_of
 from service.store.trainings import ModelRecord
 from service.store.windows import PredictionRecord, WindowBounds
+from service.store.zones import ZonesRecord
 
 # The store may give a deleted track's number to a new one; a budget may leave one point of it.
 _Track = tuple[int, datetime, int]
@@ -173,7 +174,7 @@ class Evidence:
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
     `moved_prior` is how likely a move is before any track. `before` is the piece before each of the
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
-    estimate before ended, `picture` what the newest picture says.
+    estimate before ended, `picture` what the newest picture says. `zones` hang on the pose.
     """
 
     camera_id: str
@@ -195,6 +196,7 @@ class Evidence:
     before: npt.NDArray[np.int64] | None = None
     last: LastPoseRecord | None = None
     picture: SeenPicture | None = None
+    zones: ZonesRecord | None = None
 
 
 def load_evidence(
@@ -258,6 +260,7 @@ def load_evidence(
         before=gathered.before,
         last=session.get(LastPoseRecord, reference.id),
         picture=picture,
+        zones=zones.of_camera(session, camera_id),
     )
 
 

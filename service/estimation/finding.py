@@ -12,7 +12,7 @@ import numpy as np
 
 from models.errors import CheckpointError
 from models.geometry.rotation import Array
-from models.monitoring.verdict import LIKELY
+from models.monitoring.verdict import LIKELY, pose_after
 from models.pose import (
     CREEP_SHARE,
     AlarmRate,
@@ -30,6 +30,7 @@ from models.pose import (
     assume_site,
     chart_from_bytes,
     count_walks,
+    drift_of,
     estimate_pose,
     observe_walks,
     paths_from_bytes,
@@ -51,6 +52,7 @@ from models.regression.averaging import (
 from models.walking.config import FEWEST_WALKERS
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import MOST_PIECES, Evidence, SeenTrack
+from service.estimation.moved_zones import MovedZones, moved_zones
 from service.estimation.pictures import SeenPicture
 from service.reasons import Reasons, ServiceCode
 from service.store.references import LastPoseRecord
@@ -107,6 +109,7 @@ class Finding:
     what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
     `picture` is the newest one; where it counts beside the tracks, `people_moved` is whether these
     alone say that the camera moved.
+    `zones` are what the pose comes to for them, by the `tracks`.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
     """
@@ -123,6 +126,7 @@ class Finding:
     change: SeenTrack | None
     picture: SeenPicture | None = None
     people_moved: bool | None = None
+    zones: MovedZones | None = None
     pieces: Reason | None = None
     failures: Reasons = ()
     last: LastPoseRecord | None = None
@@ -180,6 +184,8 @@ def compute_finding(
         found = replace(found, moved_prior=moved_prior, picture=picture.evidence)
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
+    zones = partial(zones_of, evidence, seen, found.fused, found.posterior)
+    moved = failures.unless_failed("zones", zones) if site.learned else None
     return Finding(
         joint=found.joint,
         fused=found.fused,
@@ -193,10 +199,20 @@ def compute_finding(
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         picture=evidence.picture,
         people_moved=people_moved,
+        zones=moved,
         pieces=walks.reason,
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
     )
+
+
+def zones_of(
+    evidence: Evidence, seen: Sequence[SeenTrack], fused: FusedEstimate, posterior: PosePosterior
+) -> MovedZones | None:
+    """What the pose that would be served comes to for zones."""
+    pose = pose_after(drift_of(posterior, fused), evidence.prior)
+    trajectories = [track.trajectory for track in seen]
+    return moved_zones(evidence.zones, evidence.intrinsics, pose, trajectories)
 
 
 def _picture_of(

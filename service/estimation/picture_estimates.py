@@ -14,12 +14,14 @@ from models.reasons import Reason
 from service.enums import PoseState
 from service.estimation.alert_evidence import hypotheses_of, offset_of
 from service.estimation.estimates import Judgement, history_of, tell_estimate, update_alerts
+from service.estimation.moved_zones import moved_zones
 from service.estimation.pictures import SeenPicture, drift_by_picture, seen_picture
 from service.notifications.outbox import json_time
 from service.reasons import ServiceCode, some
 from service.references import drift_limits
 from service.settings import Settings
-from service.store import cameras, estimates, references, tracks
+from service.store import cameras, estimates, references, tracks, zones
+from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
 from service.store.pictures import PictureRecord
 from service.wording.times import from_seconds
@@ -84,7 +86,14 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
         newest_track_pk=tracks.newest_pk(session, camera_id) or 0,
         created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
     )
-    update_alerts(session, settings, camera_id, drift, judgement, _evidence(posterior, picture))
+    evidence = _evidence(posterior, picture)
+    lens, drawn = (
+        session.get_one(CameraRecord, camera_id).intrinsics,
+        zones.of_camera(session, camera_id),
+    )
+    moved = moved_zones(drawn, lens, pose_after(drift, prior)) if verdict.drifting else None
+    evidence["zones"] = None if moved is None else asdict(moved)
+    update_alerts(session, settings, camera_id, drift, judgement, evidence)
     session.add(record)
     tell_estimate(session, record, drift)
     return record

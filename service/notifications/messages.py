@@ -10,6 +10,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from operator import itemgetter
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -23,6 +24,9 @@ from service.store import webhooks
 from service.store.alerts import AlertRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.alerts import TEST_ENDS, alert_summary
+from service.wording.zones import moved_zone_words
+
+_ZONES = 6  # in words, those that lie most wrong
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +161,12 @@ def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> di
     for name in ("acknowledged_by", "outcome"):
         if body[name]:
             annotations[name] = body[name]
+    if zones := body.get("zones"):
+        least = sorted(zones, key=itemgetter("overlap"))[:_ZONES]
+        annotations["zones"] = "\n".join(f"{z['id']}: {moved_zone_words(z)}" for z in least)
+        mended = body["mended_zones"]
+        path = f"{(public_url or '').rstrip('/')}{mended['path']}"
+        annotations["mended_zones"] = f"{path} {mended['how']}"
     # The change is told by the camera's clock. An alert that ended before it began is refused.
     started = min(body["changed_at"] or body["opened_at"], body["opened_at"])
     alert = {"labels": labels, "annotations": annotations, "startsAt": started}

@@ -18,6 +18,7 @@ from service.store import webhooks
 from service.store.alerts import AlertRecord
 from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
+from service.wording.zones import apply_words
 
 _ALERT_FIELDS = (
     *("id", "camera_id", "kind", "state", "severity", "reason", "reason_code", "reason_values"),
@@ -95,10 +96,19 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
         name: json_time(value) if isinstance(value, datetime) else value
         for name, value in values.items()
     }
+    moved = (record.evidence or {}).get("zones") or {}
+    body["zones"] = moved.get("zones")
+    body["mended_zones"] = mended_zones(record.camera_id, moved["form"]) if moved else None
     body["since"] = {"after": body.pop("changed_after"), "before": body["changed_at"]}
     body["acknowledged"] = record.acknowledged_at is not None
     body["silenced"] = record.is_silenced(datetime.now(UTC))
     return body
+
+
+def mended_zones(camera_id: str | None, form: str | None) -> dict[str, Any]:
+    """Where zones are as they should lie now, in the form that they came in, and what to do."""
+    path = f"/cameras/{camera_id}/zones" + (f"?format={form}" if form else "")
+    return {"path": path, "format": form, "how": apply_words(form)}
 
 
 def json_time(at: datetime) -> str:

@@ -1,7 +1,7 @@
 """`/ui/cameras/{id}`: the page of a camera, and all that it shows, read in one go."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated
@@ -24,6 +24,7 @@ from service.cameras.sources import SourceView, rival_sources
 from service.cameras.undo import UNDO_WITHIN, last_answer
 from service.cameras.zones import ZonesView, view_zones
 from service.enums import AlertState, PoseState, TokenScope
+from service.formats.zone_formats import ZoneFormat
 from service.pages.camera_charts import RANGES, History, draw_charts, load_history, table_rows
 from service.pages.camera_drawings import draw_camera
 from service.pages.connecting import how_to_connect
@@ -41,7 +42,7 @@ from service.wording import moves
 from service.wording.camera import CameraFacts
 from service.wording.reasons import in_words
 from service.wording.times import Clock
-from service.wording.zones import corner_words, zone_words
+from service.wording.zones import apply_words, corner_words, count_words, zone_words
 
 _TRACKS = 120  # more are a carpet
 _ALERTS, _ACTIVITY, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 40, 5, 20, 5
@@ -239,7 +240,9 @@ def show(
             page.zones,
         ),
         proposed=moves.proposed_rows(proposal.pose, proposal.sd) if proposal else None,
-        zones=_zone_rows(page.zones),
+        zones=_zone_rows(page.zones, _counts(page)),
+        applied=apply_words(page.zones.record.form if page.zones.record else None),
+        frigate=_frigate(state.settings, page.zones),
         parameters=moves.parameter_rows(
             page.camera.prior_pose, page.pose.pose, page.pose.status.estimate
         ),
@@ -288,15 +291,32 @@ def _undo(page: CameraPage, caller: Caller | None) -> UndoWords | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZoneRow:
-    """A zone in words: what a move comes to for it, and how sure its corners are; may be empty."""
+    """A zone in words: what a move comes to for it, whom it counted, how sure its corners are.
+
+    Any may be empty.
+    """
 
     name: str
     overlap: float
     meaning: str = ""
+    counted: str = ""
     sure: str = ""
 
 
-def _zone_rows(view: ZonesView) -> list[ZoneRow]:
+def _counts(page: CameraPage) -> dict[str, str]:
+    """Whom lines counted, by their names, as the alert says; not of lines that are drawn since."""
+    record, counts = page.zones.record, {}
+    for story in page.firing:
+        moved = (story.record.evidence or {}).get("zones")
+        if moved and record is not None and story.record.updated_at >= record.updated_at:
+            for each in moved["zones"]:
+                counts[each["id"]] = count_words(
+                    each["crossed"], each["missed"], each["false_counts"]
+                )
+    return counts
+
+
+def _zone_rows(view: ZonesView, counts: Mapping[str, str]) -> list[ZoneRow]:
     rows = []
     for each in view.zones:
         said = {}
@@ -304,9 +324,21 @@ def _zone_rows(view: ZonesView) -> list[ZoneRow]:
             sizes = [] if each.now.ellipses is None else each.now.ellipses[:, 0].tolist()
             worst_px = max((size for size in sizes if math.isfinite(size)), default=None)
             shares = {"overlap": each.now.overlap, "in_view": each.now.in_view}
-            said = {"meaning": zone_words(each.zone.on, **shares), "sure": corner_words(worst_px)}
+            said = {
+                "meaning": zone_words(each.zone.on, **shares),
+                "counted": counts.get(each.zone.id, ""),
+                "sure": corner_words(worst_px),
+            }
         rows.append(ZoneRow(name=each.zone.id, overlap=each.now.overlap, **said))
     return rows
+
+
+def _frigate(settings: Settings, zones: ZonesView) -> str | None:
+    """Where Frigate's configuration is edited; None of other zones, or where nobody says it."""
+    of_frigate = zones.record is not None and zones.record.form == ZoneFormat.FRIGATE
+    if not of_frigate or settings.mqtt_frigate_url is None:
+        return None
+    return f"{settings.mqtt_frigate_url.rstrip('/')}/config"
 
 
 def _flags(page: CameraPage, clock: Clock) -> list[str]:

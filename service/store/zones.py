@@ -3,9 +3,14 @@
 from datetime import datetime
 from typing import Any
 
+import numpy as np
 from sqlalchemy import JSON, ForeignKey
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
+from models.geometry.intrinsics import Intrinsics
+from models.geometry.outlines import Outline, View
+from models.geometry.pose import CameraPose
+from service.enums import ZoneOn
 from service.store.record import Record, foreign_key
 
 
@@ -31,6 +36,25 @@ class ZonesRecord(Record):
     version: Mapped[int]
     drawn_at: Mapped[datetime]
     updated_at: Mapped[datetime]
+
+    @property
+    def view(self) -> View:
+        """The lens and the pose at which they were drawn."""
+        lens = {**self.intrinsics, "distortion": tuple(self.intrinsics["distortion"])}
+        return View(intrinsics=Intrinsics(**lens), pose=CameraPose(**self.pose))
+
+    @property
+    def outlines(self) -> dict[str, Outline]:
+        """The outlines of zones by their ids, in their order."""
+        drawn = self.view
+        return {
+            each["id"]: Outline(
+                corners=np.array(each["corners"], dtype=np.float64),
+                drawn=drawn,
+                on_ground=each["on"] == ZoneOn.GROUND,
+            )
+            for each in self.zones
+        }
 
 
 def of_camera(session: Session, camera_id: str) -> ZonesRecord | None:

@@ -14,7 +14,7 @@ from models.regression.recipe import plan_to_config
 from models.walking.estimate import JointEstimate
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
-from service.estimation.finding import Finding, asked_enough
+from service.estimation.finding import Finding, asked_enough, zones_of
 from service.job_queue import JobQueue
 from service.reasons import as_said
 from service.store import journal, references, trainings
@@ -133,16 +133,19 @@ def made_up(
         )
     if changed:
         fused = replace(fused, reason=Reason(code=TracksCode.PATHS_CHANGED))
+    posterior = pose_posterior(fused, joint.walking_groups, evidence.prior)
+    seen = evidence.tracks[change or 0 :]
     return Finding(
         joint=joint,
         fused=fused,
-        posterior=pose_posterior(fused, joint.walking_groups, evidence.prior),
+        posterior=posterior,
         power=smallest_told(fused, joint.walking_groups, joint.walkers, 200.0),
         enough=asked_enough(evidence),
         averaged=None,
         reading=None,
         creep=None,
         tracks=evidence.tracks,
+        zones=zones_of(evidence, seen, fused, posterior),
         change=None if change is None else evidence.tracks[change],
     )
 

@@ -65,6 +65,8 @@ def rows(street, record):
 
 def test_a_knock_is_told_by_one_picture_with_nobody_in_sight(http):
     http.post("/cameras", json=CAMERA).raise_for_status()
+    line = {"zones": [{"id": "gate", "points": [[300, 500], [900, 500]]}]}
+    http.put("/cameras/corner/zones", json=line, headers={"If-Match": "*"}).raise_for_status()
     street = Street(http, http.settings)
     take(http, before_s=7200)
     assert street.look()["state"] == "unconnected"
@@ -81,6 +83,9 @@ def test_a_knock_is_told_by_one_picture_with_nobody_in_sight(http):
     assert found["state"] == "drifting"
     evidence = http.get(f"/alerts/{alert['id']}/evidence").raise_for_status().json()
     assert (evidence["tracks"], evidence["offset_sd"]["height_m"]) == (0, None)
+    (gate,) = http.get(f"/alerts/{alert['id']}").json()["zones"]
+    assert gate["overlap"] < 0.1
+    assert (gate["crossed"], gate["missed"]) == (0, 0)  # nobody has come
     seen = found["estimates"]["picture"]
     assert seen["matched"]
     assert seen["tilt_deg"] == pytest.approx(3.0, abs=0.1)
