@@ -116,7 +116,7 @@ def test_open_pages_follow_what_is_changed_and_removed(page, fleet, server, brow
     page.get_by_text("Live").wait_for()
     with watched(browser, server) as (its_page, wrong):
         its_page.goto("/ui/cameras/beta")
-        its_page.get_by_text("Live").wait_for()
+        its_page.get_by_text("Live", exact=True).wait_for()
         path, any_version = "/cameras/beta", {"If-Match": "*"}
         server.http.patch(path, json={"name": "Bravo"}, headers=any_version).raise_for_status()
         page.get_by_text("Bravo").wait_for()

@@ -159,7 +159,7 @@ def test_who_may_only_look_sees_a_page_that_says_so(closed, store):
     log_in(closed, token(store, "read"))
     answer = closed.get("/ui/tokens", headers=PAGE)
     assert answer.status_code == 403
-    assert "needs admin" in answer.text
+    assert "You may look, but not do this." in answer.text
     assert "/ui/register" not in answer.text
 
 

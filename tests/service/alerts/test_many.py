@@ -8,8 +8,11 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from service.alerts.alerts import open_alert
+from service.api.middleware.pages import templates
+from service.enums import AlertKind
 from service.reasons import as_said
-from service.store.alerts import AlertRecord
+from service.store.alerts import AlertRecord, answers_of
+from service.wording import alerts as alert_words
 from tests.service.conftest import problem
 from tests.service.fleet_bench import Fleet
 
@@ -116,3 +119,13 @@ def test_a_browser_gets_a_page_that_says_the_same(knocked):
     ended = knocked.get("/ui/alerts?state=resolved").text
     assert "No alert is like that" in ended
     assert "format=csv&amp;kind=clock&amp;state=firing" in clocks
+
+
+@pytest.mark.parametrize("kind", list(AlertKind))
+def test_each_kind_has_a_badge_with_a_shape_and_answers_that_are_taken(kind):
+    ui = templates.env.get_template("camera/macros.html").module
+    badge = ui.badge(kind, alert_words.BADGES[kind], "warning")
+    (shape,) = re.findall(r'href="#(i-\w+)"', badge)
+    icons = templates.env.get_template("_icons.html").render()
+    assert f'id="{shape}"' in icons
+    assert tuple(each.outcome for each in alert_words.answers(kind)) == answers_of(kind)

@@ -145,7 +145,9 @@ class Ground:
             window.to_at = now + timedelta(hours=1)
             still = read_still(self.still.getvalue(), "image/png")
             facts = {"width": still.width, "height": still.height, "sha256": "0" * 64}
-            kept = SnapshotRecord(camera_id="ok", jpeg=still.jpeg, taken_at=now, stored_at=now, **facts)
+            kept = SnapshotRecord(
+                camera_id="ok", jpeg=still.jpeg, taken_at=now, stored_at=now, **facts
+            )
             session.merge(kept)
             settings, queue = self.fleet.settings, self.fleet.queue
             queue_training(session, queue, settings, "ok")
