@@ -113,7 +113,13 @@ def turn_between(reference: Features, now: Features, intrinsics: Intrinsics) -> 
     best = consensus_at(matches, among, best.rotation, best.log_zoom)
     if not _is_evidence(matches, best):
         return None
-    return _refined(matches, best, reference, now, intrinsics, shifted=near)
+    turn = _refined(matches, best, reference, now, intrinsics, shifted=near)
+    lens = lens_of(intrinsics, reference.width, reference.height)
+    view = lens.width * lens.height / (lens.fx * lens.fy)
+    # What has driven on fills a part of the view; a camera turns all of it.
+    if not standing and _area(matches, best) < config.LEAST_SPREAD * turn.shared * view:
+        return None
+    return turn
 
 
 def turned_pose(prior: CameraPose, turn: Turn) -> CameraPose:
@@ -143,6 +149,12 @@ def _is_evidence(matches: Matches, found: Consensus) -> bool:
         and matches.cells_of(found.agree) >= config.FEWEST_CELLS
         and found.log10_false < config.LOG10_FALSE
     )
+
+
+def _area(matches: Matches, found: Consensus) -> float:
+    """The area over which the matches that agree are spread: of an even rectangle, its own."""
+    spread = np.cov(matches.reference[found.agree, :2].T)
+    return float(12 * np.sqrt(max(np.linalg.det(spread), 0.0)))
 
 
 def _stands_too(matches: Matches, found: Consensus) -> bool:

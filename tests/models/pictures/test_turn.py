@@ -142,6 +142,14 @@ def test_a_bus_before_most_of_the_view_is_no_turn(width):
     assert turn is None or degrees(turn.angle_rad) < 0.05
 
 
+def test_a_car_that_is_all_that_matches_is_no_turn():
+    """The rest of the view is in such a light that nothing of it is found again."""
+    before, after = wall(0), wall(1)
+    for picture, at in ((before, 60), (after, 130)):
+        picture[100:220, at : at + 180] = wall(7)[100:220, :180]
+    assert turn_between(describe(before), describe(after), LENS) is None
+
+
 def test_a_mask_that_hides_a_window_is_no_anchor():
     _, picture = turned(heading=5.0)
     before = wall()
