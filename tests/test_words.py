@@ -34,7 +34,7 @@ OTHERS = {
     ("formats/batch.py", "tracks"): "the name of a field",
     ("estimation/estimates.py", "picture"): "the key of an estimator's answer",
     ("estimation/picture_estimates.py", "picture"): "the key of an estimator's answer",
-    ("estimation/pictures.py", "picture"): "the key of an estimator's answer",
+    ("estimation/seen_picture.py", "picture"): "the key of an estimator's answer",
     ("pages/drawings/ground_plan.py", "picture"): "a class of a drawing",
     ("pages/drawings/picture.py", "picture"): "a class of a drawing",
     ("workers/estimate.py", "picture"): "the part of an estimate that failed",

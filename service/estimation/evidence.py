@@ -15,7 +15,7 @@ from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
-from service.estimation.pictures import SeenPicture, seen_picture
+from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows, zones

@@ -53,7 +53,7 @@ from models.walking.config import FEWEST_WALKERS
 from service.estimation.anchoring import creep_of, first_site
 from service.estimation.evidence import MOST_PIECES, Evidence, SeenTrack
 from service.estimation.moved_zones import MovedZones, moved_zones
-from service.estimation.pictures import SeenPicture
+from service.estimation.seen_picture import SeenPicture
 from service.reasons import Reasons, ServiceCode
 from service.store.references import LastPoseRecord
 from service.store.windows import PredictionRecord

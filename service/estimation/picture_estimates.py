@@ -15,7 +15,8 @@ from service.enums import PoseState
 from service.estimation.alert_evidence import hypotheses_of, offset_of
 from service.estimation.estimates import Judgement, history_of, tell_estimate, update_alerts
 from service.estimation.moved_zones import moved_zones
-from service.estimation.pictures import SeenPicture, drift_by_picture, seen_picture
+from service.estimation.pictures import drift_by_picture
+from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.notifications.outbox import json_time
 from service.reasons import ServiceCode, some
 from service.references import drift_limits

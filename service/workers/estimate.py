@@ -27,8 +27,9 @@ from service.estimation.learning import (
     save_reference,
 )
 from service.estimation.picture_estimates import save_by_picture
-from service.estimation.pictures import ask_in_doubt, compare, load_picture, save_picture
+from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
+from service.estimation.seen_picture import ask_in_doubt
 from service.store.estimates import EstimateRecord
 from service.store.look_budget import LookBudget
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
