@@ -122,7 +122,7 @@ def compare(new: NewPicture) -> ComparedPicture:
     after: Sequence[Features] = references_
     if fault is None and (references_ or new.may_begin):
         after = renewed(references_, now, turn)
-        if not references_:
+        if after and not references_:
             record.has_moved = False  # where it stands is where all others are turned from
     same = {id(each) for each in after}
     return ComparedPicture(

@@ -73,7 +73,9 @@ def seen_picture(
         return None
     if reference.answered_at is not None and record.stored_at <= reference.answered_at:
         return None
-    taken_s, bounds = record.taken_at.timestamp(), window_of(session, reference, settings)
+    # One that comes again, to the last pixel, is of when it was first seen: a camera's pictures
+    # freeze, and would say for ever that it stands.
+    taken_s, bounds = record.same_since.timestamp(), window_of(session, reference, settings)
     attended = any(from_s <= taken_s < to_s for from_s, to_s in bounds.without)
     if attended or is_before(taken_s, bounds):
         return None
@@ -87,7 +89,7 @@ def seen_picture(
 
 def _raw(record: PictureRecord) -> dict[str, Any]:
     found: dict[str, Any] = {
-        "taken_at": record.taken_at.isoformat(),
+        "taken_at": record.same_since.isoformat(),
         "matched": record.offset is not None,
     }
     if record.offset is not None and record.covariance is not None:

@@ -45,9 +45,9 @@ def picture(pose=PRIOR, seed=7, gain=1.0, grey=None):
     return made.getvalue()
 
 
-def take(http, pose=PRIOR, *, before_s=0.0, gain=1.0, grey=None):
+def take(http, pose=PRIOR, *, before_s=0.0, gain=1.0, grey=None, seed=None):
     """Send a picture."""
-    made = picture(pose, round(before_s * 10) + 7, gain, grey)
+    made = picture(pose, seed or round(before_s * 10) + 7, gain, grey)
     at = datetime.now(UTC) - timedelta(seconds=before_s)
     answer = http.put(
         PATH,
@@ -135,11 +135,13 @@ def test_a_picture_of_before_the_people_counts_no_more(http):
     street = known_street(http, http.settings, 60)
     take(http, before_s=19_000)
     street.look()
-    take(http, before_s=18_000)
+    take(http, before_s=18_000, seed=4)
     street.look()
     street.clock_s += 5_000
     street.keep_to_lanes(KNOCKED, 60)
+    take(http, seed=4)  # the same to the last pixel: frozen
     assert street.look()["state"] == "drifting"
+    assert [each["kind"] for each in street.alerts()] == ["drift", "picture"]
 
 
 @pytest.mark.parametrize("http", ["features"], indirect=True)
