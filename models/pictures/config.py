@@ -29,9 +29,8 @@ LOG10_FALSE = -6.0  # of the number of false alarms (Moisan and Stival 2004)
 RIVAL = 0.6  # of the best consensus' score: a second one as large makes both no evidence
 # The rival may have more where what stands fills 28 of 96 cells: a lorry drives, walls do not
 RIVAL_OF_WIDE, WIDE_CELLS = 0.9, 28
-LEAST_SPREAD = (
-    0.2  # of the view still in sight: a car in other light is all that matches, and moved
-)
+# Of the view still in sight: a car in other light may be all that matches, and has moved.
+LEAST_SPREAD = 0.15
 STANDING_CELLS = 0.2  # of a turn's cells that stand on the screen: masks and dirt fill fewer
 
 # Covariance
