@@ -161,7 +161,7 @@ table(
     *optional(Boolean, "has_moved"),
     *optional(DateTime, "other_at", "stood_at"),
     *needed(JSON, "agreement"),
-    *optional(LargeBinary, "stood_jpeg"),
+    *optional(LargeBinary, "unmatched", "stood_jpeg"),
 )
 table(
     "zones",

@@ -4,7 +4,7 @@ What the rest of the house asks of it stands here.
 """
 
 from models.pictures.features import Features, describe
-from models.pictures.gallery import best_turn, renewed
+from models.pictures.gallery import best_turn, bridged, renewed
 from models.pictures.health import PictureFault, judge
 from models.pictures.turn import Turn, aim_of, turned_covariance, turned_pose
 
@@ -14,6 +14,7 @@ __all__ = [
     "Turn",
     "aim_of",
     "best_turn",
+    "bridged",
     "describe",
     "judge",
     "renewed",

@@ -56,6 +56,7 @@ STRONG_INLIERS = 150  # a match that needs no second opinion, and a reference th
 MOST_TRIED = 3  # references, of each picture: the likest in light first
 LIKE_LIGHT = 1.0  # of `light_apart`: the same hour and weather
 RENEWING_SD_RAD = math.radians(0.1)  # of a picture that becomes a reference, at most
+BRIDGED_SD_RAD = math.radians(0.1)  # between two pictures that matched, it may have swayed
 RENEWING_SHARED = 0.9  # of the old view in sight, at least
 RENEWING_INLIERS = 20
 

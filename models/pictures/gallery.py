@@ -84,6 +84,29 @@ def renewed(gallery: Sequence[Features], now: Features, turn: Turn | None) -> tu
     return tuple(kept)
 
 
+def bridged(gallery: Sequence[Features], between: Features, turn: Turn) -> tuple[Features, ...]:
+    """The gallery with a picture that matched none of it, such as the first one by infrared.
+
+    The camera stood in one before it and in one after it, so it stood in between, as far as it
+    sways: what matches neither of their lights is known by that.
+
+    Args:
+        gallery: its references.
+        between: the picture.
+        turn: of the next picture that matched, against the first.
+    """
+    if not _may_be_reference(turn) or not _may_be_first(between):
+        return tuple(gallery)
+    wider = np.diag([*[config.BRIDGED_SD_RAD**2] * 3, config.FLOOR_LOG_ZOOM**2])
+    known = KnownTurn(
+        rotation=turn.rotation, log_zoom=turn.log_zoom, covariance=turn.covariance + wider
+    )
+    kept = [*gallery, replace(between, known=known)]
+    if len(kept) > config.MOST_REFERENCES:
+        del kept[_least_needed(kept)]
+    return tuple(kept)
+
+
 def light_apart(one: Measures, other: Measures) -> float:
     """How different the light of two pictures is: 1 is about an hour, or a cloud."""
     return math.hypot(

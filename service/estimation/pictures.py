@@ -21,6 +21,7 @@ from models.pictures import (
     PictureFault,
     Turn,
     best_turn,
+    bridged,
     describe,
     judge,
     renewed,
@@ -52,6 +53,7 @@ class NewPicture:
     prior: CameraPose
     gallery: tuple[tuple[int, Features], ...]
     last: PictureRecord | None
+    unmatched: bytes | None
     may_begin: bool
     limits_rad: float
     moved_prior: float
@@ -64,7 +66,7 @@ class ComparedPicture:
     record: PictureRecord
     fault: PictureFault | None
     kept: tuple[int, ...]
-    added: Features | None
+    added: tuple[Features, ...]
 
 
 def load_picture(session: Session, settings: Settings, camera_id: str) -> NewPicture | None:
@@ -86,6 +88,7 @@ def load_picture(session: Session, settings: Settings, camera_id: str) -> NewPic
         prior=prior.pose,
         gallery=_gallery(session, prior.id),
         last=session.get(PictureRecord, camera_id),
+        unmatched=pictures.unmatched(session, camera_id),
         may_begin=not (doubted or attended),
         limits_rad=drift_limits(settings).floor_rad,
         moved_prior=settings.moved_prior,
@@ -124,12 +127,17 @@ def compare(new: NewPicture) -> ComparedPicture:
         after = renewed(references_, now, turn)
         if after and not references_:
             record.has_moved = False  # where it stands is where all others are turned from
+    stands = record.has_moved is False and last is not None and last.has_moved is False
+    if turn is not None and stands and new.unmatched is not None:
+        after = bridged(after, Features.from_bytes(new.unmatched), turn)
+    waits = turn is None and fault is None and stands and bool(references_)
+    record.unmatched = now.to_bytes() if waits else None
     same = {id(each) for each in after}
     return ComparedPicture(
         record=record,
         fault=fault,
         kept=tuple(at for at, each in new.gallery if id(each) in same),
-        added=next((each for each in after if all(each is not old for old in references_)), None),
+        added=tuple(each for each in after if all(each is not old for old in references_)),
     )
 
 
@@ -146,6 +154,8 @@ def _result(
         stored_at=snapshot.stored_at,
         digest=digest,
         same_since=last.same_since if same and last else snapshot.taken_at,
+        # What is not named here stays in the store as it was, and would be the one's before.
+        **dict.fromkeys(("offset", "covariance", "zoom", "zoom_sd", "moved")),
         shifted=turn is not None and turn.shifted,
         has_moved=None if last is None else last.has_moved,
         agreement={} if new.last is None else new.last.agreement,
@@ -193,12 +203,12 @@ def save_picture(
     elif snapshot is not None:
         snapshot.compared_at = datetime.now(UTC)
     pictures.keep_only(session, camera_id, compared.kept)
-    if compared.added is not None:
+    for features in compared.added:
         session.add(
             PictureReferenceRecord(
                 camera_id=camera_id,
                 prior_pose_id=new.prior_pose_id,
-                features=compared.added.to_bytes(),
+                features=features.to_bytes(),
                 taken_at=new.snapshot.taken_at,
             )
         )

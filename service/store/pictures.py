@@ -36,7 +36,8 @@ class PictureRecord(Record):
     picture alone. `digest` is of its pixels, which were the same since `same_since`. `other_at` is
     when the newest picture was taken by which it was the other way round: stood, or had moved.
     `agreement` counts pictures by what they say and people say beside them: `stood/moved` are those
-    of a camera that stood by the picture and moved by people. `stood_jpeg` is the newest picture by
+    of a camera that stood by the picture and moved by people. `unmatched` are features of a picture
+    since the last one that matched, with which it stood. `stood_jpeg` is the newest picture by
     which it stood, where pictures are kept.
     """
 
@@ -59,6 +60,7 @@ class PictureRecord(Record):
     has_moved: Mapped[bool | None]
     other_at: Mapped[datetime | None]
     agreement: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    unmatched: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     stood_jpeg: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     stood_at: Mapped[datetime | None]
 
@@ -70,6 +72,13 @@ def gallery(session: Session, prior_pose_id: int) -> Sequence[PictureReferenceRe
         .where(PictureReferenceRecord.prior_pose_id == prior_pose_id)
         .order_by(PictureReferenceRecord.id)
     ).all()
+
+
+def unmatched(session: Session, camera_id: str) -> bytes | None:
+    """The features of a picture that matched nothing since the last that did."""
+    return session.scalar(
+        select(PictureRecord.unmatched).where(PictureRecord.camera_id == camera_id)
+    )
 
 
 def forget(session: Session, camera_id: str) -> None:

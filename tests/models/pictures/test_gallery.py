@@ -7,7 +7,7 @@ import pytest
 
 from models.pictures import config
 from models.pictures.features import describe
-from models.pictures.gallery import best_turn, light_apart, renewed
+from models.pictures.gallery import best_turn, bridged, light_apart, renewed
 from models.pictures.turn import turned_pose
 from tests.models.pictures.given import LENS, PRIOR, seen_after, wall
 
@@ -20,6 +20,20 @@ def test_the_reference_of_the_same_light_is_asked_first():
     gallery = [describe(lit(wall(), gain)) for gain in (1.0, 0.3)]
     found = best_turn(gallery, describe(lit(wall(), 0.32)), LENS)
     assert (found.reference, found.tried) == (1, 1)
+
+
+def test_what_matched_nothing_joins_at_the_turn_of_the_next_that_did():
+    gallery = (describe(wall()),)
+    night = describe(255 - wall())
+    assert best_turn(gallery, night, LENS).turn is None
+    turn = best_turn(gallery, describe(wall()), LENS).turn
+    both = bridged(gallery, night, turn)
+    assert len(both) == 2
+    found = best_turn(both, describe(255 - wall()), LENS).turn
+    assert found.angle_rad < radians(0.05)
+    # As sure as two pictures are of what was between them.
+    assert np.sqrt(np.diag(found.covariance)[:3]).min() > config.BRIDGED_SD_RAD
+    assert bridged(gallery, night, replace(turn, shared=0.5)) == gallery
 
 
 def test_no_match_is_no_turn():

@@ -160,6 +160,21 @@ def test_features_alone_are_kept_where_the_setting_says_so(http):
     assert rows(street, PictureReferenceRecord) == rows(street, PictureRecord) == 0
 
 
+def test_the_light_of_a_night_joins_once_it_was_seen_to_stand_before_and_after(http):
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street, night = Street(http, http.settings), 255 - seen_after(SCENE, PRIOR, PRIOR, LENS)
+    matched = []
+    for hours, grey in enumerate([None, None, night, night, None, night]):
+        take(http, before_s=3600 * (6 - hours), grey=grey)
+        street.look()
+        with street.context.store.read() as session:
+            matched.append(session.get_one(PictureRecord, "corner").offset is not None)
+    assert matched == [False, True, False, False, True, True]
+    take(http, grey=255 - seen_after(SCENE, PRIOR, TURNED, LENS))
+    street.look()
+    assert street.alerts()[0]["drift"]["tilt_deg"] == pytest.approx(3.0, abs=0.1)
+
+
 def test_what_is_wrong_with_a_picture_is_an_alert_of_its_own(http):
     http.post("/cameras", json=CAMERA).raise_for_status()
     street = Street(http, http.settings)
