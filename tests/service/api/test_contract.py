@@ -1,7 +1,7 @@
 """Thousands of requests out of the API's own description: no 5xx, and nothing undocumented.
 
-In CI some 500, a quarter of a minute of it, the same each time; `SUREFOOT_TEST_CASES=20000` makes
-so many, of other seeds, too. `pytest -s` shows the counts by path and status.
+In CI the corners of each schema and a little more, the same each time; `SUREFOOT_TEST_CASES=20000`
+makes so many, of other seeds, too. `pytest -s` shows the counts by path and status.
 
 Left out: `/events`, which has no end. The application runs in this process: what only a socket
 shows (half a header, a body that never ends) is not tried here.
@@ -32,7 +32,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:Generating overly large repr"),
 ]
 
-CASES = int(os.environ.get("SUREFOOT_TEST_CASES", "500"))
+CASES = int(os.environ.get("SUREFOOT_TEST_CASES", "0"))
 _CHECKS = (
     "not_a_server_error",
     "status_code_conformance",
@@ -112,10 +112,10 @@ def test_every_path_answers_as_it_is_documented(watched):
     found = {}
     go(watched, found, configured(0, "coverage", 1))  # the corners of each schema, always the same
     seed = 0
-    while watched.total < CASES:
+    while seed == 0 or watched.total < CASES:
         seed += 1
-        go(watched, found, configured(seed, "fuzzing", 12))
-        go(watched, found, configured(seed, "stateful", 60))
+        go(watched, found, configured(seed, "fuzzing", 12 if CASES else 2))
+        go(watched, found, configured(seed, "stateful", 60 if CASES else 10))
     tell(watched)
     lines = [f"{count} x {key}\n{example}" for key, (count, example) in found.items()]
     lines += [f"{count} x {crash}" for crash, count in watched.crashes.items()]
