@@ -88,10 +88,8 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
         created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
     )
     evidence = _evidence(posterior, picture)
-    lens, drawn = (
-        session.get_one(CameraRecord, camera_id).intrinsics,
-        zones.of_camera(session, camera_id),
-    )
+    lens = session.get_one(CameraRecord, camera_id).intrinsics
+    drawn = zones.of_camera(session, camera_id)
     moved = moved_zones(drawn, lens, pose_after(drift, prior)) if verdict.drifting else None
     evidence["zones"] = None if moved is None else asdict(moved)
     update_alerts(session, settings, camera_id, drift, judgement, evidence)
