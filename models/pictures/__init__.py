@@ -3,7 +3,7 @@
 What the rest of the house asks of it stands here.
 """
 
-from models.pictures.features import Features, describe
+from models.pictures.features import Features, describe_jpeg, read_gallery
 from models.pictures.gallery import best_turn, bridged, renewed
 from models.pictures.health import PictureFault, judge
 from models.pictures.turn import Turn, aim_of, turned_covariance, turned_pose
@@ -15,8 +15,9 @@ __all__ = [
     "aim_of",
     "best_turn",
     "bridged",
-    "describe",
+    "describe_jpeg",
     "judge",
+    "read_gallery",
     "renewed",
     "turned_covariance",
     "turned_pose",

@@ -1,5 +1,6 @@
 """Features of a picture: places that another picture can be compared by, and what it measures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -136,6 +137,24 @@ def describe(
         analysed=float(share),
         measures=measure(grey),
     )
+
+
+def describe_jpeg(jpeg: bytes) -> Features:
+    """The features of a picture that was made by ourselves: it is decoded in this process.
+
+    Raises:
+        ShapeError: too small or large a picture.
+    """
+    decoded: Any = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)
+    return describe(decoded)
+
+
+def read_gallery(stored: Sequence[bytes]) -> tuple[Features, ...]:
+    """Features of `to_bytes`, all or none: a gallery of another release begins anew."""
+    try:
+        return tuple(Features.from_bytes(each) for each in stored)
+    except CheckpointError:
+        return ()
 
 
 def _check(grey: Pixels) -> None:

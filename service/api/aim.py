@@ -59,9 +59,10 @@ def show(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> Ai
     """
     settings = state.settings
     with state.store.read() as session:
-        target = aim_target(session, settings, camera_id)
-    if settings.snapshots == "off" or not target.gallery or not (body or target.snapshot_url):
-        return AimOut.of(aim_by_people(target))
+        target = aim_target(session, camera_id)
+        off = settings.snapshots == "off"
+        if off or not target.gallery or not (body or target.snapshot_url):
+            return AimOut.of(aim_by_people(session, settings, camera_id))
     media_type = media_type_of(request)
     if not body:
         try:

@@ -3,7 +3,7 @@
 import hashlib
 from datetime import UTC, datetime
 
-from sqlalchemy.orm import Session, defer
+from sqlalchemy.orm import Session
 
 from service.access.activity import note
 from service.cameras.cameras import require_camera
@@ -133,7 +133,7 @@ def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> Snap
     """Size and time of a camera's still image, without reading it; None where none may be shown."""
     if settings.snapshots != "pictures":
         return None
-    return session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))
+    return cameras.snapshot_facts(session, camera_id)
 
 
 def stood_at(session: Session, settings: Settings, camera_id: str) -> datetime | None:
@@ -146,7 +146,7 @@ def stood_at(session: Session, settings: Settings, camera_id: str) -> datetime |
 
 def newest_at(session: Session, camera_id: str) -> datetime | None:
     """The time of a camera's newest picture, kept or compared; None where there is none."""
-    kept = session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))
+    kept = cameras.snapshot_facts(session, camera_id)
     compared = session.get(PictureRecord, camera_id)
     times = [each.taken_at for each in (kept, compared) if each is not None]
     return max(times, default=None)

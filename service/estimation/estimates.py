@@ -21,7 +21,7 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import WindowState, drift_of, is_site_changed, state_of
+from models.pose import PosePosterior, WindowState, drift_of, is_site_changed, state_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
@@ -335,35 +335,52 @@ def _record(
     drift: Drift,
     judgement: Judgement,
 ) -> EstimateRecord:
-    return EstimateRecord(
-        camera_id=evidence.camera_id,
+    return record_of(
+        reference,
+        finding.posterior,
+        drift,
+        judgement,
         model_id=evidence.model_id,
-        prior_pose_id=reference.prior_pose_id,
-        reference_id=reference.id,
-        state=judgement.state,
-        reasons=judgement.reasons,
-        identifiable=list(drift.identifiable),
-        pose=PoseParameters.of_pose(pose_after(drift, evidence.prior)),
-        pose_sd=drift.sd,
-        covariance=finding.posterior.covariance.tolist(),
-        drift_by=drift.by,
-        drift_angle_rad=drift.angle_rad,
         suspected=finding.reading is not None and finding.reading.suspicious,
-        drift_streak=judgement.verdict.streak,
-        drifted=list(judgement.verdict.drifted),
-        moved=drift.move.moved,
-        moved_parameters=dict(drift.move.parameters),
         rivals=rivals_of(finding),
         would_notice=would_notice(finding.power, evidence.prior),
-        drift_after=judgement.after,
-        drift_since=judgement.since,
         raw=_raw(finding),
         tracks=len(finding.tracks),
         from_s=min(track.started_s for track in finding.tracks),
         to_s=finding.tracks[-1].ended_s,
         newest_track_pk=finding.newest_pk,
+    )
+
+
+def record_of(
+    reference: SiteReferenceRecord,
+    posterior: PosePosterior,
+    drift: Drift,
+    judgement: Judgement,
+    **by: Any,
+) -> EstimateRecord:
+    """The record of a judgement; `by` are the columns that say what it is by."""
+    return EstimateRecord(
+        camera_id=reference.camera_id,
+        prior_pose_id=reference.prior_pose_id,
+        reference_id=reference.id,
+        state=judgement.state,
+        reasons=judgement.reasons,
+        identifiable=list(drift.identifiable),
+        pose=PoseParameters.of_pose(pose_after(drift, posterior.prior)),
+        pose_sd=drift.sd,
+        covariance=posterior.covariance.tolist(),
+        drift_by=drift.by,
+        drift_angle_rad=drift.angle_rad,
+        drift_streak=judgement.verdict.streak,
+        drifted=list(judgement.verdict.drifted),
+        moved=drift.move.moved,
+        moved_parameters=dict(drift.move.parameters),
+        drift_after=judgement.after,
+        drift_since=judgement.since,
         # A clock that was set back must not make it older than the reference that it was held to.
         created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
+        **by,
     )
 
 

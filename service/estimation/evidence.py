@@ -223,7 +223,7 @@ def load_evidence(
         newest=True,
     )
     records, model = gathered.records, trainings.newest_model(session, camera_id)
-    picture = seen_picture(session, settings, reference)
+    picture = seen_picture(session, reference, bounds)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records, picture):
         return None
     kept = session.get(FlowMapRecord, reference.id)

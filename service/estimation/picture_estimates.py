@@ -1,8 +1,8 @@
 """The estimate by a picture alone: of a camera that nobody has walked by since, or ever."""
 
 import math
-from dataclasses import asdict
-from datetime import UTC, datetime
+from dataclasses import asdict, replace
+from datetime import datetime
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -13,13 +13,19 @@ from models.pose import PosePosterior, posterior_by_picture
 from models.reasons import Reason
 from service.enums import PoseState
 from service.estimation.alert_evidence import hypotheses_of, offset_of
-from service.estimation.estimates import Judgement, history_of, tell_estimate, update_alerts
+from service.estimation.estimates import (
+    Judgement,
+    history_of,
+    record_of,
+    tell_estimate,
+    update_alerts,
+)
 from service.estimation.moved_zones import moved_zones
 from service.estimation.pictures import drift_by_picture
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.notifications.outbox import json_time
 from service.reasons import ServiceCode, some
-from service.references import drift_limits
+from service.references import drift_limits, window_of
 from service.settings import Settings
 from service.store import cameras, estimates, references, tracks, zones
 from service.store.cameras import CameraRecord
@@ -33,7 +39,7 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
     reference = references.newest_if_any(session, camera_id)
     if reference is None:
         return None
-    picture = seen_picture(session, settings, reference)
+    picture = seen_picture(session, reference, window_of(session, reference, settings))
     last = estimates.newest(session, camera_id)
     if picture is None or picture.evidence is None or picture.was_told(last):
         return None
@@ -58,34 +64,22 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
         since=taken_at if verdict.drifting else None,
     )
     if verdict.drifting and drifted and last is not None:
-        judgement = _begun(judgement, last)
-    record = EstimateRecord(
-        camera_id=camera_id,
-        prior_pose_id=reference.prior_pose_id,
-        reference_id=reference.id,
-        state=judgement.state,
-        reasons=judgement.reasons,
-        identifiable=list(drift.identifiable),
-        pose=PoseParameters.of_pose(pose_after(drift, prior)),
-        pose_sd=drift.sd,
-        covariance=posterior.covariance.tolist(),
-        drift_by=drift.by,
-        drift_angle_rad=drift.angle_rad,
+        # When it began, as it was told.
+        since = last.drift_since or judgement.since
+        judgement = replace(judgement, after=last.drift_after, since=since)
+    record = record_of(
+        reference,
+        posterior,
+        drift,
+        judgement,
         suspected=False,
-        drift_streak=verdict.streak,
-        drifted=list(verdict.drifted),
-        moved=drift.move.moved,
-        moved_parameters=dict(drift.move.parameters),
         rivals=[],
         would_notice={},
-        drift_after=judgement.after,
-        drift_since=judgement.since,
         raw={"picture": picture.raw},
         tracks=0,
         from_s=picture.taken_s,
         to_s=picture.taken_s,
         newest_track_pk=tracks.newest_pk(session, camera_id) or 0,
-        created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
     )
     evidence = _evidence(posterior, picture)
     lens = session.get_one(CameraRecord, camera_id).intrinsics
@@ -101,17 +95,6 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
 def _stood_at(session: Session, camera_id: str) -> datetime | None:
     found = session.get(PictureRecord, camera_id)
     return None if found is None else found.other_at
-
-
-def _begun(judgement: Judgement, last: EstimateRecord) -> Judgement:
-    """A judgement of a drift that began before: when, as it was told."""
-    return Judgement(
-        state=judgement.state,
-        reasons=judgement.reasons,
-        verdict=judgement.verdict,
-        after=last.drift_after,
-        since=last.drift_since or judgement.since,
-    )
 
 
 def _evidence(posterior: PosePosterior, picture: SeenPicture) -> dict[str, object]:

@@ -6,13 +6,10 @@ Three steps, as of an estimate: read in one transaction, computed in none, saved
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
 
-import cv2
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.errors import CheckpointError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import ANGLES, CameraPose
 from models.monitoring.verdict import LIKELY, Drift, drift_between
@@ -22,8 +19,9 @@ from models.pictures import (
     Turn,
     best_turn,
     bridged,
-    describe,
+    describe_jpeg,
     judge,
+    read_gallery,
     renewed,
     turned_covariance,
     turned_pose,
@@ -53,7 +51,7 @@ class NewPicture:
     prior: CameraPose
     gallery: tuple[tuple[int, Features], ...]
     last: PictureRecord | None
-    unmatched: bytes | None
+    unmatched: Features | None
     may_begin: bool
     limits_rad: float
     moved_prior: float
@@ -71,9 +69,9 @@ class ComparedPicture:
 
 def load_picture(session: Session, settings: Settings, camera_id: str) -> NewPicture | None:
     """The picture of a camera that waits to be compared; None where there is none."""
-    snapshot = session.get(SnapshotRecord, camera_id)
+    snapshot = cameras.waiting_snapshot(session, camera_id)
     camera = session.get(CameraRecord, camera_id)
-    if snapshot is None or snapshot.compared_at is not None or camera is None:
+    if snapshot is None or camera is None:
         return None
     prior = cameras.prior_pose(session, camera_id)
     if prior.assumed:
@@ -81,36 +79,26 @@ def load_picture(session: Session, settings: Settings, camera_id: str) -> NewPic
     now = datetime.now(UTC)
     doubted = any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
     attended = references.maintenance_under_way(session, camera_id, now) is not None
+    kept = pictures.gallery(session, prior.id)
+    ids, gallery = [each.id for each in kept], read_gallery([each.features for each in kept])
+    unmatched = pictures.unmatched(session, camera_id)
     return NewPicture(
         snapshot=snapshot,
         intrinsics=camera.intrinsics,
         prior_pose_id=prior.id,
         prior=prior.pose,
-        gallery=_gallery(session, prior.id),
+        gallery=tuple(zip(ids, gallery, strict=False)),  # none of it, or all
         last=session.get(PictureRecord, camera_id),
-        unmatched=pictures.unmatched(session, camera_id),
+        unmatched=next(iter(read_gallery([unmatched] if unmatched else [])), None),
         may_begin=not (doubted or attended),
         limits_rad=drift_limits(settings).floor_rad,
         moved_prior=settings.moved_prior,
     )
 
 
-def _gallery(session: Session, prior_pose_id: int) -> tuple[tuple[int, Features], ...]:
-    """A gallery with the ids of its rows; one of another release begins anew."""
-    try:
-        return tuple(
-            (each.id, Features.from_bytes(each.features))
-            for each in pictures.gallery(session, prior_pose_id)
-        )
-    except CheckpointError:
-        return ()
-
-
 def compare(new: NewPicture) -> ComparedPicture:
     """Compare a picture with the gallery."""
-    pixels = np.frombuffer(new.snapshot.jpeg, np.uint8)
-    grey: Any = cv2.imdecode(pixels, cv2.IMREAD_GRAYSCALE)  # a JPEG that we have made ourselves
-    now = describe(grey)
+    now = describe_jpeg(new.snapshot.jpeg)
     references_ = [features for _, features in new.gallery]
     turn = best_turn(references_, now, new.intrinsics).turn
     last = new.last if new.last and new.last.prior_pose_id == new.prior_pose_id else None
@@ -129,7 +117,7 @@ def compare(new: NewPicture) -> ComparedPicture:
             record.has_moved = False  # where it stands is where all others are turned from
     stands = record.has_moved is False and last is not None and last.has_moved is False
     if turn is not None and stands and new.unmatched is not None:
-        after = bridged(after, Features.from_bytes(new.unmatched), turn)
+        after = bridged(after, new.unmatched, turn)
     waits = turn is None and fault is None and stands and bool(references_)
     record.unmatched = now.to_bytes() if waits else None
     same = {id(each) for each in after}
@@ -194,7 +182,7 @@ def save_picture(
     Where features alone are kept, the picture goes.
     """
     camera_id = new.snapshot.camera_id
-    snapshot = session.get(SnapshotRecord, camera_id)
+    snapshot = cameras.snapshot_facts(session, camera_id)
     newer = snapshot is None or snapshot.sha256 != new.snapshot.sha256
     if newer or cameras.prior_pose(session, camera_id).id != new.prior_pose_id:
         return False

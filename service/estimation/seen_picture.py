@@ -11,12 +11,12 @@ from sqlalchemy.orm import Session
 from models.geometry.pose import ANGLES
 from models.pose import PictureEvidence
 from service.enums import PoseState
-from service.references import is_before, window_of
-from service.settings import Settings
+from service.references import is_before
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
 from service.store.pictures import PictureRecord
 from service.store.references import SiteReferenceRecord
+from service.store.windows import WindowBounds
 
 _LATER = 0.25  # of the people: so many may have come after a picture that counts beside them
 _DOUBTS = (PoseState.SUSPECTED, PoseState.UNSURE, PoseState.DRIFTING)
@@ -62,9 +62,9 @@ def ask_in_doubt(session: Session, record: EstimateRecord, picture: SeenPicture 
 
 
 def seen_picture(
-    session: Session, settings: Settings, reference: SiteReferenceRecord
+    session: Session, reference: SiteReferenceRecord, bounds: WindowBounds
 ) -> SeenPicture | None:
-    """The newest picture that was compared, where it is of now.
+    """The newest picture that was compared, where it is of now: within the bounds of the window.
 
     None where it is of before a reference, an answer or a change, or somebody was at the camera.
     """
@@ -75,7 +75,7 @@ def seen_picture(
         return None
     # One that comes again, to the last pixel, is of when it was first seen: a camera's pictures
     # freeze, and would say for ever that it stands.
-    taken_s, bounds = record.same_since.timestamp(), window_of(session, reference, settings)
+    taken_s = record.same_since.timestamp()
     attended = any(from_s <= taken_s < to_s for from_s, to_s in bounds.without)
     if attended or is_before(taken_s, bounds):
         return None

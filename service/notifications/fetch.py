@@ -98,11 +98,13 @@ class _Checked(httpx.BaseTransport):
     """Requests to addresses that are checked as they are connected to; one connection each."""
 
     def __init__(self, networks: Networks, end_s: float, *, public: bool = True) -> None:
-        left = lambda: end_s - time.monotonic()  # noqa: E731
         self._pool = httpcore.ConnectionPool(
             ssl_context=tls_context(),
             network_backend=CheckedBackend(
-                networks, left, setting="SUREFOOT_SNAPSHOT_ALLOW", public=public
+                networks,
+                lambda: end_s - time.monotonic(),
+                setting="SUREFOOT_SNAPSHOT_ALLOW",
+                public=public,
             ),
         )
 

@@ -22,7 +22,7 @@ from sqlalchemy import (
     select,
     type_coerce,
 )
-from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, defer, mapped_column
 
 from models.geometry.intrinsics import Intrinsics, Projection
 from models.geometry.pose import CameraPose
@@ -404,6 +404,18 @@ class SnapshotRecord(Record):
     taken_at: Mapped[datetime]
     stored_at: Mapped[datetime]
     compared_at: Mapped[datetime | None]
+
+
+def snapshot_facts(session: Session, camera_id: str) -> SnapshotRecord | None:
+    """The still image of a camera, of which the picture itself is not read."""
+    return session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))
+
+
+def waiting_snapshot(session: Session, camera_id: str) -> SnapshotRecord | None:
+    """The still image of a camera that nobody has compared; one that was is not even read."""
+    waits = SnapshotRecord.compared_at.is_(None)
+    found = select(SnapshotRecord).where(SnapshotRecord.camera_id == camera_id, waits)
+    return session.scalars(found).first()
 
 
 def remove_snapshot(session: Session, camera_id: str) -> bool:
