@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from models.geometry.folding import first_fold
 from models.geometry.rotation import Array, Mask
 
 _NEWTON_STEPS = 30
-_NO_DISTORTION = 1e-9  # a coefficient that moves no pixel
 _CONVERGED = 1e-10  # normalised units; 1e-7 px on a long lens
 
 
@@ -37,10 +37,7 @@ class Brown(NamedTuple):
         into the image; such points are not valid. Infinite where it never folds.
         """
         # d/dr r (1 + k1 r^2 + k2 r^4 + k3 r^6) as a polynomial in s = r^2
-        slope = np.array([7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0])
-        roots = np.roots(np.where(np.abs(slope) < _NO_DISTORTION, 0.0, slope))
-        real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
-        return float(np.sqrt(real.min())) if real.size else math.inf
+        return first_fold([7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0])
 
     def angle_rad(self, radius: float) -> float:
         """The angle from the axis that an image radius is of, by the focal length alone."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from models.geometry.folding import first_fold
 from models.geometry.rotation import Array, Mask
 
 # Rays have z = 1: at a right angle to the axis there is none, and here one is 29 long.
@@ -36,9 +37,7 @@ class Fisheye(NamedTuple):
     def max_angle_rad(self) -> float:
         """The angle from the axis up to which rays are known: 88 deg, or where the image folds."""
         slope = [9 * self.k4, 7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0]  # in theta^2
-        roots = np.roots(np.where(np.abs(slope) < _TINY, 0.0, slope))
-        real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
-        return min(MOST_ANGLE_RAD, float(np.sqrt(real.min())) if real.size else math.inf)
+        return min(MOST_ANGLE_RAD, first_fold(slope))
 
     @property
     def max_radius(self) -> float:

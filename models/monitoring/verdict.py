@@ -195,12 +195,10 @@ def judge(
     )
 
 
-def may_be_told(
-    moved: float, limits: DriftLimits, creep: Creep | None, drifted: tuple[str, ...]
-) -> bool:
-    """False where `judge` can tell no drift, whatever else it is given."""
+def may_be_told(moved: float, limits: DriftLimits, creep: Creep | None, *, told: bool) -> bool:
+    """False where `judge` can tell no drift, whatever else it is given; `told` one before."""
     crept = creep is not None and creep.moved
-    return bool(drifted) or crept or moved >= min(config.BORNE_OUT, limits.certainty)
+    return told or crept or moved >= min(config.BORNE_OUT, limits.certainty)
 
 
 def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:

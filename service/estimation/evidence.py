@@ -15,10 +15,12 @@ from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
+from service.alerts.alerts import fired_by_estimate
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows, zones
+from service.store.alerts import MOVED_KINDS
 from service.store.cameras import CameraRecord
 from service.store.look_budget import LookBudget
 from service.store.references import (
@@ -174,7 +176,8 @@ class Evidence:
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
     `moved_prior` is how likely a move is before any track. `before` is the piece before each of the
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
-    estimate before ended, `picture` what the newest picture says. `zones` hang on the pose.
+    estimate before ended, `picture` what the newest picture says. `zones` hang on
+    the pose; `told` is whether an alert says already that it is another one.
     """
 
     camera_id: str
@@ -197,6 +200,7 @@ class Evidence:
     last: LastPoseRecord | None = None
     picture: SeenPicture | None = None
     zones: ZonesRecord | None = None
+    told: bool = False
 
 
 def load_evidence(
@@ -226,6 +230,8 @@ def load_evidence(
     picture = seen_picture(session, reference, bounds)
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records, picture):
         return None
+    drawn = zones.of_camera(session, camera_id)
+    told = drawn is not None and not fired_by_estimate(session, camera_id).isdisjoint(MOVED_KINDS)
     kept = session.get(FlowMapRecord, reference.id)
     answered_at = alerts.answered_at(session, camera_id)
     seen = [
@@ -260,7 +266,8 @@ def load_evidence(
         before=gathered.before,
         last=session.get(LastPoseRecord, reference.id),
         picture=picture,
-        zones=zones.of_camera(session, camera_id),
+        zones=drawn,
+        told=told,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from models.errors import CheckpointError
 from models.geometry.rotation import Array
-from models.monitoring.verdict import LIKELY, pose_after
+from models.monitoring.verdict import LIKELY, may_be_told, pose_after
 from models.pose import (
     CREEP_SHARE,
     AlarmRate,
@@ -184,8 +184,13 @@ def compute_finding(
         found = replace(found, moved_prior=moved_prior, picture=picture.evidence)
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
-    zones = partial(zones_of, evidence, seen, found.fused, found.posterior)
-    moved = failures.unless_failed("zones", zones) if site.learned else None
+    moved = None
+    # They are told of with an alert: of a camera that stands, nobody asks.
+    if site.learned and may_be_told(
+        found.posterior.moved, evidence.limits, creep, told=evidence.told
+    ):
+        zones = partial(zones_of, evidence, seen, found.fused, found.posterior)
+        moved = failures.unless_failed("zones", zones)
     return Finding(
         joint=found.joint,
         fused=found.fused,

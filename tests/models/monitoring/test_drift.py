@@ -6,12 +6,14 @@ import pytest
 
 from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters
 from models.monitoring.chart import ChartResult
+from models.monitoring.creep import Creep
 from models.monitoring.verdict import (
     DriftLimits,
     MoveProbabilities,
     clock_fault,
     drift_between,
     judge,
+    may_be_told,
     pose_after,
 )
 from models.reasons import TracksCode
@@ -199,3 +201,23 @@ def test_a_clock_fault_is_a_jump_in_scale_alone():
         drift(height_m=7.2, move=scale, unidentifiable=("roll",)),
     ):
         assert clock_fault(found, 0.2, PRIOR, 25.0) is None
+
+
+@pytest.mark.parametrize("drifted", [(), ("tilt",)])
+@pytest.mark.parametrize("moved", [0.0, 0.5, 0.89, 0.9, 0.98, 0.99, 1.0])
+@pytest.mark.parametrize("statistic", [None, 1.0, 50.0])
+@pytest.mark.parametrize("crept", [None, 1.0, 50.0])
+def test_no_drift_is_told_of_what_may_not_be_told(drifted, moved, statistic, crept):
+    """What is only told with a drift need not be computed before."""
+    chart = creep = None
+    if statistic is not None:
+        chart = ChartResult(
+            statistic=statistic, level=10.0, parameter=0, sign=1, walking_groups=20, track_idx=0,
+            suspicious=True,
+        )  # fmt: skip
+    if crept is not None:
+        creep = Creep(statistic=crept, level=10.0, parameter=0, by=0.1, sd=0.01, since_day=1.0)
+    now = drift(5.0, move=likely(moved, tilt=1.0))
+    told = judge(now, LIMITS, drifted, chart, creep).drifting
+    assert may_be_told(moved, LIMITS, creep, told=bool(drifted)) or not told
+    assert may_be_told(0.5, LIMITS, None, told=False) is False

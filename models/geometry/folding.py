@@ -1,0 +1,19 @@
+"""Where a lens' polynomial folds back: beyond it, a picture has nothing of the view."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+_NO_DISTORTION = 1e-9  # a coefficient that moves no pixel
+
+
+def first_fold(slope: Sequence[float]) -> float:
+    """The least r above 0 at which a slope, a polynomial in r^2, is 0; infinite where it never is.
+
+    Args:
+        slope: its coefficients, that of the highest power first.
+    """
+    roots = np.roots(np.where(np.abs(slope) < _NO_DISTORTION, 0.0, slope))
+    real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
+    return float(np.sqrt(real.min())) if real.size else math.inf
