@@ -144,7 +144,6 @@ table(
     camera(),
     prior_pose(),
     *needed(LargeBinary, "features"),
-    *needed(DateTime, "taken_at"),
     Index(None, "camera_id", "id"),
 )
 table(
@@ -156,8 +155,6 @@ table(
     *needed(DateTime, "same_since"),
     *optional(JSON, "turn", "covariance"),
     *optional(Double, "zoom", "zoom_sd"),
-    *needed(Boolean, "shifted"),
-    *optional(Double, "moved"),
     *optional(Boolean, "has_moved"),
     *optional(DateTime, "other_at", "stood_at"),
     *needed(JSON, "agreement"),

@@ -103,11 +103,10 @@ def compare(new: NewPicture) -> ComparedPicture:
     turn = best_turn(references_, now, new.intrinsics).turn
     last = new.last if new.last and new.last.prior_pose_id == new.prior_pose_id else None
     record = _result(new, now, turn, last)
-    unchanged_s = (record.taken_at - record.same_since).total_seconds()
     fault = judge(
         now.measures,
         [each.measures for each in references_],
-        unchanged_s=unchanged_s,
+        unchanged_s=record.unchanged_s,
         matched=turn is not None,
     )
     after: Sequence[Features] = references_
@@ -143,8 +142,7 @@ def _result(
         digest=digest,
         same_since=last.same_since if same and last else snapshot.taken_at,
         # What is not named here stays in the store as it was, and would be the one's before.
-        **dict.fromkeys(("offset", "covariance", "zoom", "zoom_sd", "moved")),
-        shifted=turn is not None and turn.shifted,
+        **dict.fromkeys(("offset", "covariance", "zoom", "zoom_sd")),
         has_moved=None if last is None else last.has_moved,
         agreement={} if new.last is None else new.last.agreement,
         other_at=None if last is None else last.other_at,
@@ -157,7 +155,6 @@ def _result(
     record.zoom = float(np.exp(turn.log_zoom))
     record.zoom_sd = record.zoom * float(np.sqrt(turn.covariance[3, 3]))
     posterior = posterior_by_picture(new.prior, evidence, new.moved_prior)
-    record.moved = posterior.moved
     has_moved = posterior.moved >= LIKELY
     if has_moved and drift_by_picture(posterior).angle_rad < new.limits_rad:
         return record  # so little may be the light's
@@ -197,7 +194,6 @@ def save_picture(
                 camera_id=camera_id,
                 prior_pose_id=new.prior_pose_id,
                 features=features.to_bytes(),
-                taken_at=new.snapshot.taken_at,
             )
         )
     _cut_window(session, camera_id, new.last, compared.record)
@@ -232,8 +228,7 @@ def _tell_fault(
     if fault is None:
         end_alert(session, camera_id, AlertKind.PICTURE, Outcome.CLEARED)
         return
-    unchanged_s = (record.taken_at - record.same_since).total_seconds()
-    values = {"unchanged_s": unchanged_s} if fault is PictureFault.FROZEN else {}
+    values = {"unchanged_s": record.unchanged_s} if fault is PictureFault.FROZEN else {}
     open_alert(
         session,
         settings,

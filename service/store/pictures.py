@@ -23,7 +23,6 @@ class PictureReferenceRecord(Record):
     camera_id: Mapped[str] = camera_key()
     prior_pose_id: Mapped[int] = foreign_key("prior_poses.id", index=True)
     features: Mapped[bytes] = mapped_column(LargeBinary)
-    taken_at: Mapped[datetime]
 
     __table_args__ = (Index(None, "camera_id", "id"),)
 
@@ -32,8 +31,8 @@ class PictureRecord(Record):
     """The result of a camera's newest picture, against the gallery of its prior pose.
 
     `offset` is how far it has turned from that, in tilt, roll and heading, with the covariance of
-    the three; None where it matched none of the gallery. `moved` is how likely that is by the
-    picture alone. `digest` is of its pixels, which were the same since `same_since`. `other_at` is
+    the three; None where it matched none of the gallery, and `has_moved` is of the last that did.
+    `digest` is of its pixels, which were the same since `same_since`. `other_at` is
     when the newest picture was taken by which it was the other way round: stood, or had moved.
     `agreement` counts pictures by what they say and people say beside them: `stood/moved` are those
     of a camera that stood by the picture and moved by people. `unmatched` are features of a picture
@@ -55,14 +54,17 @@ class PictureRecord(Record):
     covariance: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
     zoom: Mapped[float | None]
     zoom_sd: Mapped[float | None]
-    shifted: Mapped[bool]
-    moved: Mapped[float | None]
     has_moved: Mapped[bool | None]
     other_at: Mapped[datetime | None]
     agreement: Mapped[dict[str, Any]] = mapped_column(default=dict)
     unmatched: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     stood_jpeg: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     stood_at: Mapped[datetime | None]
+
+    @property
+    def unchanged_s(self) -> float:
+        """For how long all pictures have been this one, to the last pixel."""
+        return (self.taken_at - self.same_since).total_seconds()
 
 
 def gallery(session: Session, prior_pose_id: int) -> Sequence[PictureReferenceRecord]:
