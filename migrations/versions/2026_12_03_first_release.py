@@ -155,6 +155,7 @@ table(
     *needed(DateTime, "same_since"),
     *optional(JSON, "turn", "covariance"),
     *optional(Double, "zoom", "zoom_sd"),
+    *needed(Boolean, "shifted"),
     *optional(Boolean, "has_moved"),
     *optional(DateTime, "other_at", "stood_at"),
     *needed(JSON, "agreement"),

@@ -182,6 +182,7 @@ def _judge(
         finding.fused.reason if gone else None,
         None if creep is None else reason_of_creep(creep),
         reason_of_drift(drift, verdict, evidence.limits),
+        finding.picture.reason if finding.picture and finding.posterior.pictured else None,
         clock,
         None if finding.reading is None else reason_of_chart(finding.reading),
         None if gone else finding.fused.reason,

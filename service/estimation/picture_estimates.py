@@ -58,7 +58,7 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
     by = Reason(code=ServiceCode.BY_PICTURE, values={"taken_at": json_time(taken_at)})
     judgement = Judgement(
         state=PoseState.DRIFTING if verdict.drifting else state,
-        reasons=some(by, reason_of_drift(drift, verdict, limits)),
+        reasons=some(by, reason_of_drift(drift, verdict, limits), picture.reason),
         verdict=verdict,
         after=_stood_at(session, camera_id) if verdict.drifting else None,
         since=taken_at if verdict.drifting else None,

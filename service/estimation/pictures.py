@@ -143,6 +143,7 @@ def _result(
         same_since=last.same_since if same and last else snapshot.taken_at,
         # What is not named here stays in the store as it was, and would be the one's before.
         **dict.fromkeys(("offset", "covariance", "zoom", "zoom_sd")),
+        shifted=turn is not None and turn.shifted,
         has_moved=None if last is None else last.has_moved,
         agreement={} if new.last is None else new.last.agreement,
         other_at=None if last is None else last.other_at,

@@ -10,7 +10,9 @@ from sqlalchemy.orm import Session
 
 from models.geometry.pose import ANGLES
 from models.pose import PictureEvidence
+from models.reasons import Reason
 from service.enums import PoseState
+from service.reasons import ServiceCode
 from service.references import is_before
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
@@ -42,6 +44,11 @@ class SeenPicture:
         """
         later = sum(each > self.taken_s for each in ended_s)
         return self.evidence is not None and later <= _LATER * len(ended_s)
+
+    @property
+    def reason(self) -> Reason | None:
+        """The reason for a wider interval of what it says."""
+        return Reason(code=ServiceCode.PICTURE_SHIFTED) if self.raw.get("shifted") else None
 
     def was_told(self, last: EstimateRecord | None) -> bool:
         """True where an estimate has had its word."""
@@ -97,5 +104,6 @@ def _raw(record: PictureRecord) -> dict[str, Any]:
         names = [f"{name}_rad" for name in ANGLES]
         found |= dict(zip(names, record.offset, strict=True))
         found["zoom"] = record.zoom
+        found["shifted"] = record.shifted
         found["sd"] = dict(zip(names, sd, strict=True)) | {"zoom": record.zoom_sd}
     return found

@@ -9,7 +9,8 @@ import sys
 import warnings
 from io import BytesIO
 
-from PIL import Image, ImageOps, UnidentifiedImageError
+# A phone's JPEG of several pictures is read by the third: no file can be opened once it is needed.
+from PIL import Image, ImageOps, MpoImagePlugin, UnidentifiedImageError  # noqa: F401
 
 from service.formats.confined import give_up_rights
 
@@ -32,7 +33,7 @@ def _load_all() -> None:
     """Have the library import what it needs, while files can still be opened."""
     exif = Image.Exif()
     exif[0x0112] = 6  # turned
-    Image.init()
+    Image.preinit()  # JPEG and PNG are among these few
     for form in ("JPEG", "PNG"):
         made = BytesIO()
         Image.new("RGB", (2, 1)).save(made, form, exif=exif)

@@ -32,8 +32,9 @@ class PictureRecord(Record):
 
     `offset` is how far it has turned from that, in tilt, roll and heading, with the covariance of
     the three; None where it matched none of the gallery, and `has_moved` is of the last that did.
-    `digest` is of its pixels, which were the same since `same_since`. `other_at` is
-    when the newest picture was taken by which it was the other way round: stood, or had moved.
+    `shifted` says that it was moved aside, too. `digest` is of its pixels, which were the same
+    since `same_since`. `other_at` is when the newest picture was taken by which it was the other
+    way round: stood, or had moved.
     `agreement` counts pictures by what they say and people say beside them: `stood/moved` are those
     of a camera that stood by the picture and moved by people. `unmatched` are features of a picture
     since the last one that matched, with which it stood. `stood_jpeg` is the newest picture by
@@ -54,6 +55,7 @@ class PictureRecord(Record):
     covariance: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
     zoom: Mapped[float | None]
     zoom_sd: Mapped[float | None]
+    shifted: Mapped[bool]
     has_moved: Mapped[bool | None]
     other_at: Mapped[datetime | None]
     agreement: Mapped[dict[str, Any]] = mapped_column(default=dict)

@@ -274,6 +274,10 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     ServiceCode.SITE_CHANGED: (
         "the picture says that it stands, and people walk elsewhere: the site changed"
     ),
+    ServiceCode.PICTURE_SHIFTED: (
+        "near and far things moved apart in the picture: the camera was moved aside, too, and how "
+        "far it turned is known less well"
+    ),
     ServiceCode.PICTURE_FROZEN: "the same picture for {unchanged_s_in_h:.1f} h",
     ServiceCode.PICTURE_BLACK: "its picture is black",
     ServiceCode.PICTURE_BLINDED: "it is blinded: far more of its picture is white than ever",

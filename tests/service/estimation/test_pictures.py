@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from math import radians
 
+import cv2
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -111,6 +112,20 @@ def test_a_picture_tells_a_knock_before_people_do_and_since_when(http):
     since = found["since"]
     assert since["after"] == before["estimates"]["picture"]["taken_at"].replace("+00:00", "Z")
     assert since["before"] == found["estimates"]["picture"]["taken_at"].replace("+00:00", "Z")
+
+
+def test_a_camera_that_was_moved_aside_is_said_to_be(http):
+    """Near things, below, are further aside than far ones, above: no turn does that."""
+    street = known_street(http, http.settings, 60)
+    take(http, before_s=7200)
+    assert "moved aside" not in str(street.look())
+    rows_ = np.arange(LENS.height, dtype=np.float32)
+    aside = LENS.width / 640 * (12 + np.maximum(rows_ - LENS.height / 3, 0) / LENS.height * 60)
+    u, v = np.meshgrid(np.arange(LENS.width, dtype=np.float32), rows_)
+    take(http, grey=cv2.remap(SCENE, u + aside[:, None].astype(np.float32), v, cv2.INTER_LINEAR))
+    found = street.look()
+    assert found["estimates"]["picture"]["shifted"]
+    assert "moved aside" in str(found), found
 
 
 def test_a_picture_that_says_it_stands_makes_other_paths_a_changed_site(http):

@@ -130,6 +130,9 @@ SAID = [
      "by a picture of 2026-11-25T09:30:00Z, nobody having walked by since"),
     (S.SITE_CHANGED, {},
      "the picture says that it stands, and people walk elsewhere: the site changed"),
+    (S.PICTURE_SHIFTED, {},
+     "near and far things moved apart in the picture: the camera was moved aside, too, and how far "
+     "it turned is known less well"),
     (S.PICTURE_FROZEN, {"unchanged_s": 9000.0}, "the same picture for 2.5 h"),
     (S.PICTURE_BLACK, {}, "its picture is black"),
     (S.PICTURE_BLINDED, {}, "it is blinded: far more of its picture is white than ever"),
