@@ -54,6 +54,7 @@ class Street:
         self.clock_s = lately_s()
         self.seed = 0
         self.seen: list[Trajectory] = []
+        self.source: str | None = None
         self._bodies: list[dict[str, Any]] = []
         self._lanes: list[Lane] = []
 
@@ -133,7 +134,10 @@ class Street:
         self.seen.append(Trajectory(time_s=time_s, uv=uv, top_v=top_v))
 
     def _post(self) -> None:
-        answer = self.http.post("/cameras/corner/tracks", json={"tracks": self._bodies})
+        body = {"tracks": self._bodies}
+        if self.source is not None:
+            body["source"] = self.source
+        answer = self.http.post("/cameras/corner/tracks", json=body)
         assert answer.json()["accepted"] == len(self._bodies), answer.text
         self._bodies.clear()
 

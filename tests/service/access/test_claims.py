@@ -17,6 +17,7 @@ from service.store.engines.store import Store
 from service.store.tracks import TrackRecord
 from tests.conftest import CAMERA, track
 from tests.service.conftest import problem
+from tests.service.street import KNOCKED, PRIOR, Street
 
 
 class Site:
@@ -29,7 +30,7 @@ class Site:
         self._texts = {}
         self._posted = 0
         self.token("admin", scopes=("admin",))
-        self.http.post("/cameras", json=CAMERA, headers=self._bearer("admin"))
+        self.http.post("/cameras", json=CAMERA, headers=self.bearer("admin"))
 
     def token(self, name, scopes=("ingest",), **named):
         with self.store.write() as session:
@@ -45,13 +46,13 @@ class Site:
         self._posted += 1
         body = {"source": source, "tracks": [track(str(self._posted), time.time() - 60)]}
         url = f"/cameras/{camera_id}/tracks"
-        return self.http.post(url, json=body, headers=self._bearer(name))
+        return self.http.post(url, json=body, headers=self.bearer(name))
 
     def sources(self):
-        found = self.http.get("/cameras/corner/sources", headers=self._bearer("admin")).json()
+        found = self.http.get("/cameras/corner/sources", headers=self.bearer("admin")).json()
         return {each["name"]: (each["counts"], each["tracks"]) for each in found["items"]}
 
-    def _bearer(self, name):
+    def bearer(self, name):
         return {"Authorization": f"Bearer {self._texts[name]}"}
 
 
@@ -75,6 +76,35 @@ def test_a_second_token_does_not_post_under_the_first_ones_name(site):
     assert site.post("liar", "another").status_code == 202
     problem(site.post("tracker", "another"), 403, "forbidden")
     assert site.sources() == {"bytetrack-1.2": (True, 2), "another": (False, 1)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seen", "feigned"), [(KNOCKED, PRIOR), (PRIOR, KNOCKED)])
+def test_500_people_of_a_second_token_hide_no_knock_and_feign_none(site, seen, feigned):
+    http = site.http
+    admin = site.bearer("admin")
+    change = {"json": {"reference_tracks": 60}, "headers": {**admin, "If-Match": "*"}}
+    http.patch("/cameras/corner", **change).raise_for_status()
+    for name in ("tracker", "liar"):
+        site.token(name, scopes=("read", "ingest"))
+    http.headers.update(site.bearer("tracker"))
+    street = Street(http, site.settings)
+    street.keep_to_lanes(PRIOR, 60)
+    assert street.look()["reference"]["state"] == "ready"
+    street.keep_to_lanes(seen, 40)
+    told = street.look()
+    liar = Street(http, site.settings)
+    liar.clock_s = street.clock_s
+    http.headers.update(site.bearer("liar"))
+    with pytest.raises(KeyError):  # 403: nothing is accepted
+        liar.keep_to_lanes(feigned, 500)
+    liar.source = "another"
+    liar.keep_to_lanes(feigned, 500)
+    found = street.look()
+    assert found["state"] == told["state"] == ("drifting" if seen is KNOCKED else "ok")
+    assert found["drift"] == told["drift"]
+    street.close()
+    liar.close()
 
 
 def test_a_name_is_free_once_its_token_is_revoked(site):
@@ -147,5 +177,5 @@ def test_a_source_of_when_access_was_off_is_the_tokens_that_posts_next(settings,
 )
 def test_sources_are_named_for_posting_alone(site, named):
     body = {"name": "x", "scopes": ["ingest"], **named}
-    answer = site.http.post("/tokens", json=body, headers=site._bearer("admin"))
+    answer = site.http.post("/tokens", json=body, headers=site.bearer("admin"))
     problem(answer, 422, "malformed")
