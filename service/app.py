@@ -48,11 +48,11 @@ from service.pages import (
     access,
     aim_page,
     alerts_page,
-    api_docs,
     camera_page,
     connecting,
     fleet,
     health,
+    reference,
     registration,
 )
 from service.pages import webhooks as webhooks_page
@@ -120,7 +120,6 @@ def create_app(settings: Settings) -> FastAPI:
         activity,
         operation,
         client,
-        api_docs,
         fleet,
         alerts_page,
         camera_page,
@@ -128,6 +127,7 @@ def create_app(settings: Settings) -> FastAPI:
         connecting,
         registration,
         health,
+        reference,
         webhooks_page,
         tokens,
         access,

@@ -1,8 +1,6 @@
 """The page of settings: a row for each field."""
 
-from typing import Any
-
-from service.settings import Settings
+from service.pages.reference import SettingRow, setting_rows
 
 _HEAD = """\
 # Settings
@@ -18,19 +16,11 @@ The common ones are flags of `surefoot serve`, too.
 
 def settings_page() -> str:
     """The settings: name, default, meaning."""
-    return _HEAD + "".join(f"{_row(name)}\n" for name in Settings.model_fields)
+    return _HEAD + "".join(map(_row, setting_rows()))
 
 
-def _row(name: str) -> str:
-    field = Settings.model_fields[name]
-    described = (field.description or "").replace("|", "\\|")
-    default = "by the machine" if field.default_factory else _words(field.default)
-    return f"| `{name.upper()}` | {default} | {described} |"
-
-
-def _words(value: Any) -> str:
-    if value is None or value == "":
-        return "unset"
-    if isinstance(value, bool):
-        return f"`{str(value).lower()}`"
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+def _row(row: SettingRow) -> str:
+    words = row.default in ("unset", "by the machine")
+    default = row.default if words else f"`{row.default}`"
+    meaning = row.meaning.replace("|", "\\|")
+    return f"| `{row.name}` | {default} | {meaning} |\n"
