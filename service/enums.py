@@ -123,6 +123,7 @@ class Act(StrEnum):
     ACCEPT = "accept"
     RESET = "reset"
     UNDO = "undo"
+    TAG = "tag"
 
 
 class Outcome(StrEnum):
@@ -236,6 +237,7 @@ class Activity(StrEnum):
 
     CAMERA_REGISTERED = "camera.registered"
     CAMERA_CHANGED = "camera.changed"
+    CAMERA_DESCRIBED = "camera.described"
     CAMERA_REMOVED = "camera.removed"
     POSE_AGREED = "pose.agreed"
     POSE_ACCEPTED = "pose.accepted"

@@ -9,12 +9,14 @@ from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
 from service.api.ignored import NamingRoute
+from service.api.labels import MOST_TAGS, Tags
 from service.api.middleware.dependencies import AppState, CallerDep, StateDep
 from service.api.schemas import Body, Moment, Text, Who
-from service.cameras import decisions, maintenance, undo
+from service.cameras import cameras, decisions, maintenance, undo
 from service.cameras.answers import Decision
+from service.cameras.cameras import CameraChange
 from service.enums import Act, Answer
-from service.errors import ServiceError
+from service.errors import ConflictError, ServiceError
 from service.store.access import name_in, set_actor
 
 _NEEDS = {Act.SILENCE: ("until",), Act.RESOLVE: ("outcome",), Act.MAINTENANCE: ("to",)}
@@ -24,7 +26,7 @@ class ActsBody(Body):
     """An act, and the ids of alerts or cameras that it is done with, in this order.
 
     `until` and `reason` are of a silence, `outcome` of a resolution, `from`, `to` and `reason` of
-    maintenance.
+    maintenance, `add` and `remove` of tags.
     """
 
     ids: Annotated[list[Text], Field(min_length=1, max_length=500)]
@@ -36,12 +38,16 @@ class ActsBody(Body):
     outcome: Answer | None = None
     from_: Moment | None = Field(None, alias="from")
     to: Moment | None = None
+    add: Tags = []
+    remove: Tags = []
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
         for name in _NEEDS.get(self.act, ()):
             if name not in self.model_fields_set or (name != "until" and not getattr(self, name)):
                 raise ValueError(f"{name}: is needed to {self.act}")
+        if self.act == Act.TAG and not (self.add or self.remove):
+            raise ValueError("add: a tag to add or to remove is needed")
         return self
 
 
@@ -119,6 +125,16 @@ def _maintain(session: Session, state: AppState, one: str, body: ActsBody) -> No
     )
 
 
+def _tag(session: Session, state: AppState, one: str, body: ActsBody) -> None:
+    record = cameras.require_camera(session, one)
+    tags = sorted({*record.tags, *body.add} - {*body.remove})
+    if len(tags) > MOST_TAGS:
+        raise ConflictError(f"tags: at most {MOST_TAGS} are taken, it would have {len(tags)}")
+    if tags != record.tags:
+        change, etag = CameraChange(tags=tags), cameras.etag_of(record)
+        cameras.change_camera(session, state.queue, state.settings, one, etag, change, body.by)
+
+
 def _decide(use_case: Callable[..., object]) -> Callable[[Session, AppState, str, ActsBody], None]:
     def decide(session: Session, state: AppState, one: str, body: ActsBody) -> None:
         decision = Decision(camera_id=one, by=name_in(session, body.by), note=body.note)
@@ -136,5 +152,6 @@ _DO: dict[Act, Callable[[Session, AppState, str, ActsBody], None]] = {
     Act.ACCEPT: _decide(decisions.accept_pose),
     Act.RESET: _decide(decisions.learn_anew),
     Act.UNDO: _decide(undo.undo_answer),
+    Act.TAG: _tag,
 }
-_OF_CAMERAS = (Act.MAINTENANCE, Act.PUT_BACK, Act.ACCEPT, Act.RESET, Act.UNDO)
+_OF_CAMERAS = (Act.MAINTENANCE, Act.PUT_BACK, Act.ACCEPT, Act.RESET, Act.UNDO, Act.TAG)

@@ -1,16 +1,16 @@
 """`/cameras`: register, list, show, change, remove."""
 
-import re
 from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, Query, Response
-from pydantic import AfterValidator, BaseModel, Field, StringConstraints, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from models.geometry.intrinsics import Intrinsics
 from service.api.documented import ETAG
 from service.api.ignored import NamingRoute
+from service.api.labels import CameraName, Site, Tags, slug
 from service.api.middleware.dependencies import IfMatch, ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     Body,
@@ -23,6 +23,7 @@ from service.api.schemas import (
     PriorPoseBody,
     ReferenceOut,
     Text,
+    Who,
 )
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
@@ -36,7 +37,6 @@ def _checked_url(text: str) -> str:
     return text
 
 
-CameraName = Annotated[str, StringConstraints(max_length=200)]
 FrameRate = Annotated[Finite, Field(gt=0, le=1000)]
 SnapshotUrl = Annotated[str, AfterValidator(_checked_url)]
 ReferenceTracks = Annotated[int, Field(ge=5, le=100_000)]
@@ -75,6 +75,8 @@ class CameraBody(_LensedBody):
 
     id: CameraId | None = None
     name: CameraName | None = None
+    site: Site = ""
+    tags: Tags = []
     prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
@@ -104,13 +106,18 @@ class CameraBody(_LensedBody):
             walking_speed_sd_mps=self.walking_speed.sd_mps,
             reference_tracks=self.reference_tracks,
             snapshot_url=self.snapshot_url,
+            site=self.site,
+            tags=self.tags,
         )
 
 
 class CameraPatch(_LensedBody):
     """What to change of a camera; fields left out stay. A prior pose has to be a whole one."""
 
-    name: CameraName | None = None
+    name: CameraName | None = Field(None, description="empty: its id")
+    site: Site | None = None
+    tags: Tags | None = None
+    by: Who | None = None
     prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
@@ -136,6 +143,8 @@ class CameraOut(Out):
 
     id: str
     name: str
+    site: str | None
+    tags: list[str]
     intrinsics: IntrinsicsBody
     prior_pose: PoseOut | None
     frame_rate_hz: float | None
@@ -188,11 +197,6 @@ class CameraPage(BaseModel):
     next_cursor: str | None
 
 
-def slug(name: str) -> str:
-    """An id made of a name: lower case, digits and hyphens."""
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:50]
-
-
 router = APIRouter(prefix="/cameras", tags=["cameras"], route_class=NamingRoute)
 
 
@@ -220,9 +224,13 @@ def list_all(
         list[PoseState] | None,
         Query(alias="state", description="cameras in this state alone; may be said repeatedly"),
     ] = None,
+    site: Annotated[Site, Query(description="cameras of this site and of those below it")] = "",
+    tag: Annotated[Tags | None, Query(description="cameras with all of these")] = None,
 ) -> CameraPage:
     """Cameras in order of their ids; `next_cursor` leads to the next page."""
-    views = cameras.list_cameras(session, state.settings, cursor, limit + 1, wanted or ())
+    views = cameras.list_cameras(
+        session, state.settings, cursor, limit + 1, wanted or (), site, tag or ()
+    )
     page = views[:limit]
     return CameraPage(
         items=[CameraOut.from_value(view) for view in page],
@@ -261,6 +269,8 @@ def change(
         if_match,
         CameraChange(
             name=body.name,
+            site=body.site,
+            tags=body.tags,
             intrinsics=body.lens_value(),
             prior_pose=None if body.prior_pose is None else body.prior_pose.to_value(),
             frame_rate_hz=body.frame_rate_hz,
@@ -269,13 +279,20 @@ def change(
             reference_tracks=body.reference_tracks,
             snapshot_url=body.snapshot_url,
         ),
+        body.by,
     )
     response.headers["ETag"] = view.etag
     return CameraAnswer.from_value(view)
 
 
 @router.delete("/{camera_id}", status_code=204)
-def remove(camera_id: str, state: StateDep, session: WriteDep, if_match: IfMatch = None) -> None:
+def remove(
+    camera_id: str,
+    state: StateDep,
+    session: WriteDep,
+    if_match: IfMatch = None,
+    by: Annotated[Who | None, Query(description="who deletes it")] = None,
+) -> None:
     """Delete a camera with its tracks, models, estimates and alerts; `If-Match` as of a change."""
-    cameras.remove_camera(session, camera_id, if_match)
+    cameras.remove_camera(session, camera_id, if_match, by)
     state.posts.forget(camera_id)  # another may come under its id

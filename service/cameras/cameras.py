@@ -35,6 +35,7 @@ from service.store.cameras import CameraRecord, PriorPoseRecord
 from service.training import stop_trainings, train_by_itself
 
 _MANY = 1000  # more alerts than a camera has kinds
+_DESCRIBING = {"name", "site", "tags"}  # fields that nothing hangs on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +52,8 @@ class CameraSpec:
     walking_speed_sd_mps: float
     reference_tracks: int
     snapshot_url: str | None = None
+    site: str = ""
+    tags: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +61,8 @@ class CameraChange:
     """Changes to a camera; None stays."""
 
     name: str | None = None
+    site: str | None = None
+    tags: Sequence[str] | None = None
     intrinsics: Intrinsics | None = None
     prior_pose: CameraPose | None = None
     frame_rate_hz: float | None = None
@@ -111,6 +116,8 @@ def register_camera(
     record = CameraRecord(
         id=camera_id,
         name=spec.name or camera_id,
+        site=spec.site or None,
+        tags=list(spec.tags),
         **_columns(spec.intrinsics),
         frame_rate_hz=spec.frame_rate_hz,
         walking_speed_mean_mps=spec.walking_speed_mean_mps,
@@ -157,13 +164,19 @@ def list_cameras(
     after_id: str,
     limit: int,
     states: Collection[PoseState] = (),
+    site: str = "",
+    tags: Collection[str] = (),
 ) -> list[CameraView]:
     """Some cameras in order of their ids, after one; of some states alone, if any are named.
 
-    By a handful of statements, however many they are.
+    So with a site, which is all that lies below it, and with tags, which are all needed. By a
+    handful of statements, however many they are.
     """
     # A state is derived and stands in no column.
-    ids = cameras.ids(session, after_id, None if states else limit)
+    if site or tags:
+        ids = cameras.ids_labelled(session, after_id, site, tags)[: None if states else limit]
+    else:
+        ids = cameras.ids(session, after_id, None if states else limit)
     statuses = camera_statuses(session, settings, ids)
     if states:
         wanted = (i for i, each in statuses.items() if each.state in states)
@@ -183,6 +196,7 @@ def change_camera(
     camera_id: str,
     etag: str | None,
     change: CameraChange,
+    by: str | None = None,
 ) -> CameraView:
     """Change a camera; another lens or prior pose queues a training.
 
@@ -202,6 +216,7 @@ def change_camera(
     for name, value in {**changed, **lens}.items():
         if name not in ("intrinsics", "prior_pose"):
             setattr(record, name, value)
+    record.name, record.site = record.name or record.id, record.site or None
     if change.snapshot_url is not None:
         record.snapshot_url = change.snapshot_url or None
         record.snapshot_due_at = record.snapshot_error = None
@@ -215,7 +230,7 @@ def change_camera(
     if geometry_changed or change.walking_speed_mean_mps is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
-            close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, None))
+            close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, by))
         # Tracks seen so far may be of another pose or lens, but not of other people.
         from_s = reference.from_s
         if geometry_changed:
@@ -226,16 +241,21 @@ def change_camera(
         if change.prior_pose is None and prior.assumed:
             origin, given = Origin.ASSUMED, prior.given
         renew_prior_pose(
-            session, queue, settings, camera_id, pose, origin, from_s=from_s, by=None, given=given
+            session, queue, settings, camera_id, pose, origin, from_s=from_s, by=by, given=given
         )
-    details = {"fields": list(changed)}
-    note(session, Activity.CAMERA_CHANGED, by=None, camera_id=camera_id, details=details)
+    words = {name: value for name, value in changed.items() if name in _DESCRIBING}
+    # An answer about the pose can be taken back after other words for the camera.
+    what = Activity.CAMERA_CHANGED if len(words) < len(changed) else Activity.CAMERA_DESCRIBED
+    details = {"fields": list(changed), **words}
+    note(session, what, by=by, camera_id=camera_id, details=details)
     tell_of_camera(session, camera_id)
     session.flush()
     return view_camera(session, settings, camera_id)
 
 
-def remove_camera(session: Session, camera_id: str, etag: str | None) -> None:
+def remove_camera(
+    session: Session, camera_id: str, etag: str | None, by: str | None = None
+) -> None:
     """Delete a camera with all that is stored of it; who was told of its alerts is told their end.
 
     Raises:
@@ -250,7 +270,7 @@ def remove_camera(session: Session, camera_id: str, etag: str | None) -> None:
     ):
         end_alert(session, camera_id, alert.kind, Outcome.CAMERA_REMOVED)
     details = {"name": record.name}
-    note(session, Activity.CAMERA_REMOVED, by=None, camera_id=camera_id, details=details)
+    note(session, Activity.CAMERA_REMOVED, by=by, camera_id=camera_id, details=details)
     tell_of_camera(session, camera_id, removed=True)
     session.delete(record)
 

@@ -37,7 +37,7 @@ def status(url: Url = LOCAL_URL, token_file: TokenFile = None, as_json: Json = F
     """Say how a running service and its cameras are; 1 where an alert fires or it is not ready."""
     with asked(url, token_file) as service:
         ready = service.readiness()
-        states = Counter(camera["state"] for camera in _all_cameras(service, ()))
+        states = Counter(camera["state"] for camera in _all_cameras(service))
         alerts = service.get("/alerts", state=AlertState.FIRING.value, limit=_PAGE)["items"]
     severities = Counter(alert["severity"] for alert in alerts)
     waiting = sum(_waits(alert) for alert in alerts)
@@ -64,22 +64,26 @@ def cameras(
     state: Annotated[
         list[PoseState] | None, typer.Option(help="Those in this state; repeatedly.")
     ] = None,
+    site: Annotated[str, typer.Option(help="Those of this site, and below it.")] = "",
+    tag: Annotated[list[str] | None, typer.Option(help="Those with all of these.")] = None,
     url: Url = LOCAL_URL,
     token_file: TokenFile = None,
     as_json: Json = False,
 ) -> None:
     """List the cameras of a running service with their states."""
     with asked(url, token_file) as service:
-        found = list(_all_cameras(service, state or ()))
+        states = [each.value for each in state or ()]
+        found = list(_all_cameras(service, state=states, site=site, tag=tag or []))
     if as_json:
         for camera in found:
             tell(camera)
         return
     rows = [
-        (each["id"], each["state"], _learned(each["reference"]), each["tracks"], each["name"])
+        (each["id"], each["state"], _learned(each["reference"]), each["tracks"], each["site"] or "",
+         each["name"])
         for each in found
-    ]
-    table([("id", "state", "learned", "tracks", "name"), *rows])
+    ]  # fmt: skip
+    table([("id", "state", "learned", "tracks", "site", "name"), *rows])
 
 
 def alerts(
@@ -170,11 +174,10 @@ def _following(service: "Service") -> Iterator["Event"]:
             delay_s = min(2 * delay_s, _LONGEST_S)
 
 
-def _all_cameras(service: "Service", states: tuple[()] | list[PoseState]) -> Iterator[Any]:
+def _all_cameras(service: "Service", **wanted: Any) -> Iterator[Any]:
     cursor: str | None = ""
     while cursor is not None:
-        query = {"state": [each.value for each in states], "cursor": cursor, "limit": _PAGE}
-        page = service.get("/cameras", **query)
+        page = service.get("/cameras", **wanted, cursor=cursor, limit=_PAGE)
         yield from page["items"]
         cursor = page["next_cursor"]
 

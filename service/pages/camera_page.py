@@ -253,6 +253,7 @@ def show(
         activity=[(entry, alert_words.entry_words(entry, clock)) for entry in page.activity],
         connect=None if learned.ready else how_to_connect(request, state.settings, camera_id),
         operates=operates,
+        administers=caller is None or caller.may(TokenScope.ADMIN),
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,

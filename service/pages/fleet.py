@@ -20,12 +20,19 @@ from service.cameras.reference_views import reference_views
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, TokenScope
 from service.pages.drawings.sparkline import sparkline
-from service.pages.fleet_index import Entry, attended_until, entry_of, fleet_index
+from service.pages.fleet_index import (
+    Entry,
+    attended_until,
+    entry_of,
+    fleet_index,
+    index_document,
+)
 from service.references import drift_limits, wanted_tracks
 from service.settings import Settings
 from service.store import alerts, fleet, journal
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
+from service.store.fleet import Label
 from service.store.trainings import TrainingRecord
 from service.wording import alerts as alert_words
 from service.wording.camera import (
@@ -53,7 +60,7 @@ class FleetRow:
     """
 
     now: datetime
-    name: str
+    label: Label
     status: CameraStatus
     drift: Drift | None
     history: tuple[float | None, ...]
@@ -74,7 +81,12 @@ class FleetRow:
     @property
     def entry(self) -> Entry:
         """The camera as it stands in the index."""
-        return entry_of(self.status, self.name, self.now)
+        return entry_of(self.status, self.label, self.now)
+
+    @property
+    def name(self) -> str:
+        """The camera's name."""
+        return self.label.name
 
     @property
     def words(self) -> str:
@@ -138,14 +150,14 @@ def list_fleet(
     """All cameras, or some, those first that need a person; a dozen statements for all of them."""
     now = datetime.now(UTC)
     statuses = camera_statuses(session, settings, ids)
-    names = dict(fleet.names(session, ids))
+    labels = fleet.labels(session, ids)
     history = fleet.drift_history(session, ids, _HISTORY, drift_limits(settings))
     references = reference_views(session, settings, statuses)
     trainings = fleet.unfinished_trainings(session, ids)
     rows = [
         FleetRow(
             now=now,
-            name=names[camera_id],
+            label=labels[camera_id],
             status=each,
             drift=_sure_drift(each.estimate) if each.state != PoseState.LEARNING else None,
             history=tuple(history[camera_id]),
@@ -156,7 +168,7 @@ def list_fleet(
             unfinished=trainings.get(camera_id),
         )
         for camera_id, each in statuses.items()
-        if camera_id in names
+        if camera_id in labels
     ]
     return sorted(rows, key=lambda row: row.entry.order)
 
@@ -196,13 +208,16 @@ def show(
     session: ReadDep,
     q: Annotated[Text, Query(max_length=200)] = "",
     wanted: Annotated[list[Text] | None, Query(alias="state", max_length=20)] = None,
+    site: Annotated[Text, Query(max_length=200)] = "",
+    tag: Annotated[list[Text] | None, Query(max_length=20)] = None,
 ) -> HTMLResponse:
     """The cameras that are asked for, what needs a person first: a page of them, and an index."""
     # What happens from here on is an event that the page asks for, even if it is in here too.
     newest = journal.newest_event_id(session)
     index = fleet_index(session, state.settings)
     count = Counter(entry.shown for entry in index)
-    found = [entry for entry in index if entry.fits(wanted or (), q.casefold().split())]
+    words = q.casefold().split()
+    found = [entry for entry in index if entry.fits(wanted or (), words, site, tag or ())]
     groups = list_groups(session)
     return render(
         request,
@@ -210,7 +225,7 @@ def show(
         newest_event=newest,
         counts=[(each, word, count[each]) for each, word in STATES.items()],
         waiting=alerts.count_waiting(session, datetime.now(UTC)),
-        index=[entry.line for entry in index],
+        index=index_document(index),
         rows=list_fleet(session, state.settings, [entry.id for entry in found[:PAGE]]),
         page_size=PAGE,
         groups=groups,
@@ -221,8 +236,8 @@ def show(
 @router.get("/ui/fleet/index")
 def index(state: StateDep, session: ReadDep) -> JSONResponse:
     """All cameras in a few numbers each, as the page's script keeps them."""
-    lines = [entry.line for entry in fleet_index(session, state.settings)]
-    return JSONResponse(lines, headers=HEADERS)
+    document = index_document(fleet_index(session, state.settings))
+    return JSONResponse(document, headers=HEADERS)
 
 
 @router.get("/ui/fleet/rows")

@@ -1,8 +1,9 @@
 """All cameras of the fleet in a few numbers each: what its page sifts, sorts and counts by."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -10,6 +11,7 @@ from service.cameras.status import CameraStatus, camera_statuses, waits
 from service.enums import AlertKind, PoseState, Severity
 from service.settings import Settings
 from service.store import fleet
+from service.store.fleet import Label
 from service.wording.camera import STATES, shown_as
 from service.wording.times import from_seconds
 
@@ -36,7 +38,7 @@ class Entry:
     """
 
     id: str
-    name: str
+    label: Label
     shown: PoseState | AlertKind
     rank: int
     waiting: int
@@ -48,29 +50,45 @@ class Entry:
     def order(self) -> tuple[int, int, str, str]:
         """Sorts first what a person should look at first; of one kind the newest, then by name."""
         calm = self.rank >= _CALM
-        return self.rank, 0 if calm else -self.since_s, self.name.casefold(), self.id
+        return self.rank, 0 if calm else -self.since_s, self.label.name.casefold(), self.id
 
     @property
     def line(self) -> list[str | int | None]:
         """As the page's script reads it (fleet.js)."""
         return [
-            *(self.id, self.name, self.shown, self.rank, self.waiting, self.since_s),
-            *(self.last_s, self.words),
+            *(self.id, self.label.name, self.shown, self.rank, self.waiting, self.since_s),
+            *(self.last_s, self.words, self.label.place),
         ]
 
-    def fits(self, states: Collection[str], words: Iterable[str]) -> bool:
-        """True of one of some states, if any are named, in which all words are found."""
-        text = f"{self.name} {self.id} {STATES[self.shown]} {self.words}".casefold()
-        return (not states or self.shown in states) and all(word in text for word in words)
+    def fits(
+        self, states: Collection[str], words: Iterable[str], site: str, tags: Iterable[str]
+    ) -> bool:
+        """True of one of some states and of a site, if any are named, with all words and tags."""
+        own = self.label
+        text = f"{own.name} {self.id} {STATES[self.shown]} {self.words} {own.place}".casefold()
+        return (
+            (not states or self.shown in states)
+            and (not site or own.site == site or own.site.startswith(f"{site}/"))
+            and set(tags) <= set(own.tags)
+            and all(word in text for word in words)
+        )
 
 
-def entry_of(status: CameraStatus, name: str, now: datetime) -> Entry:
+def index_document(entries: Sequence[Entry]) -> dict[str, Any]:
+    """The lines of all, with each place once: they name it by its number."""
+    places = {entry.label.place: 0 for entry in entries}
+    numbers = {place: number for number, place in enumerate(places)}
+    lines = [[*entry.line[:-1], numbers[entry.label.place]] for entry in entries]
+    return {"places": list(places), "cameras": lines}
+
+
+def entry_of(status: CameraStatus, label: Label, now: datetime) -> Entry:
     """The entry of a camera."""
     seen_by = [each.acknowledged_by for each in status.alerts if each.acknowledged_by is not None]
     source = status.reference.source
     return Entry(
         id=status.camera_id,
-        name=name,
+        label=label,
         shown=shown_as(status.state, status.alerts),
         rank=_rank(status, now),
         waiting=sum(waits(alert, now) for alert in status.alerts),
@@ -83,9 +101,9 @@ def entry_of(status: CameraStatus, name: str, now: datetime) -> Entry:
 def fleet_index(session: Session, settings: Settings) -> list[Entry]:
     """All cameras, those first that need a person."""
     now = datetime.now(UTC)
-    names = dict(fleet.names(session, None))
+    labels = fleet.labels(session, None)
     statuses = camera_statuses(session, settings)
-    entries = [entry_of(each, names[i], now) for i, each in statuses.items() if i in names]
+    entries = [entry_of(each, labels[i], now) for i, each in statuses.items() if i in labels]
     return sorted(entries, key=lambda entry: entry.order)
 
 

@@ -10,7 +10,8 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_va
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from models.geometry.intrinsics import Projection, coefficients_of
-from service.api.cameras import CameraBody, CameraName, FrameRate, ReferenceTracks
+from service.api.cameras import CameraBody, FrameRate, ReferenceTracks
+from service.api.labels import CameraName, Site, Tags
 from service.api.schemas import (
     Body,
     CameraId,
@@ -176,10 +177,17 @@ class TypedRest(Body):
 
     id: CameraId | None = None
     name: CameraName | None = None
+    site: Site = ""
+    tags: Tags = []
     frame_rate_hz: FrameRate | None = None
     reference_tracks: ReferenceTracks = 200
 
     _typed = field_validator("frame_rate_hz", "reference_tracks", mode="before")(_number)
+
+    @field_validator("tags", mode="before")
+    @classmethod
+    def _words(cls, text: str) -> list[str]:
+        return [word for word in _SEPARATORS.split(text) if word]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,6 +207,8 @@ class RegistrationForm(Body):
     lens_form: Literal["pixels", "view", "sensor"] = "pixels"
     name: Typed = ""
     id: Typed = ""
+    site: Typed = ""
+    tags: Typed = ""
     width: Typed = ""
     height: Typed = ""
     fx: Typed = ""
@@ -283,10 +293,10 @@ def _field_error(item: ErrorDetails) -> FieldError:
     if item["type"] == "value_error":  # of all fields together: it begins with a field's name
         name, _, reason = str(said["error"]).partition(": ")
         return FieldError(pointer=f"/{name}", reason=reason)
-    reason = _REASONS.get(item["type"], item["msg"])
-    return FieldError(
-        pointer=f"/{item['loc'][0]}", reason=reason.format(**{"got": _brief(item["input"]), **said})
-    )
+    known, reason = _REASONS.get(item["type"]), item["msg"]  # which may have braces, as typed
+    if known is not None:
+        reason = known.format(**{"got": _brief(item["input"]), **said})
+    return FieldError(pointer=f"/{item['loc'][0]}", reason=reason)
 
 
 def _of_matrix(error: FieldError) -> FieldError:

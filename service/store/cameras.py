@@ -53,13 +53,15 @@ class CameraRecord(Record):
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
     `estimate_after`. `lacks` says what failed beside the served estimate. A picture is asked of
     `snapshot_url` at `snapshot_due_at`, at once where that is None; `snapshot_error` is why the
-    last one did not come.
+    last one did not come. `site` is a path, None where nobody has said one.
     """
 
     __tablename__ = "cameras"
 
     id: Mapped[str] = mapped_column(String(64), primary_key=True)
     name: Mapped[str]
+    site: Mapped[str | None]
+    tags: Mapped[list[str]] = mapped_column(default=list)
     width: Mapped[int]
     height: Mapped[int]
     fx: Mapped[float]
@@ -289,6 +291,21 @@ def ids(session: Session, after_id: str = "", limit: int | None = None) -> Seque
     """The ids of cameras after one, in order; of all, unless it is said how many."""
     query = select(CameraRecord.id).where(CameraRecord.id > after_id)
     return session.scalars(query.order_by(CameraRecord.id).limit(limit)).all()
+
+
+def ids_labelled(
+    session: Session, after_id: str, site: str, tags: Collection[str]
+) -> Sequence[str]:
+    """The same of those at a site, or below it, that have all of some tags; of any site if empty.
+
+    No index: of as many cameras as there may be, all are looked through in milliseconds.
+    """
+    query = select(CameraRecord.id, CameraRecord.tags).where(CameraRecord.id > after_id)
+    if site:  # not by LIKE, which minds the case on one database and not on the other
+        below = func.substr(CameraRecord.site, 1, len(site) + 1) == f"{site}/"
+        query = query.where(or_(CameraRecord.site == site, below))
+    rows = session.execute(query.order_by(CameraRecord.id))
+    return [camera_id for camera_id, own in rows if set(tags) <= set(own)]
 
 
 def count(session: Session) -> int:

@@ -152,6 +152,30 @@ def given(ids: Ids) -> dict[str, list[str]]:
     return {} if ids is None else {_IDS: list(ids)}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Label:
+    """The name of a camera, and where it belongs; an empty site is none."""
+
+    name: str
+    site: str = ""
+    tags: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """Site and tags in a line, such as "campus/north #outdoor", as pages read it, too."""
+        return " ".join([*([self.site] if self.site else []), *(f"#{tag}" for tag in self.tags)])
+
+
+def labels(session: Session, ids: Ids) -> dict[str, Label]:
+    """The label of each camera."""
+    c = CameraRecord
+    query = select(c.id, c.name, c.site, c.tags).where(among(c.id, ids))
+    return {
+        camera_id: Label(name=name, site=site or "", tags=tuple(tags))
+        for camera_id, name, site, tags in session.execute(query)
+    }
+
+
 def names(session: Session, ids: Ids) -> list[tuple[str, str]]:
     """Id and name of each camera."""
     query = select(CameraRecord.id, CameraRecord.name).where(among(CameraRecord.id, ids))

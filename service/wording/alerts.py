@@ -98,6 +98,7 @@ TEST_ENDS = "This is a test of surefoot; it ends by itself."
 _DONE = {
     Activity.CAMERA_REGISTERED: "registered the camera",
     Activity.CAMERA_CHANGED: "changed what is said of the camera",
+    Activity.CAMERA_DESCRIBED: "changed its {fields}",
     Activity.CAMERA_REMOVED: "removed the camera",
     Activity.POSE_AGREED: "agreed to the pose that people told",
     Activity.POSE_ACCEPTED: "accepted the new pose as the prior pose",
@@ -252,6 +253,7 @@ def entry_words(entry: ActivityRecord, clock: Clock) -> str:
         "alert": f"the alert “{kind}”",
         "until": "" if entry.until is None else clock.when(entry.until),
         "outcome": "" if entry.outcome is None else OUTCOMES[entry.outcome],
+        "fields": ", ".join(entry.details.get("fields", ())),
     }
     if entry.what in _HAPPENED:
         text = _HAPPENED[entry.what]

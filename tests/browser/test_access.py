@@ -135,6 +135,7 @@ def test_who_may_only_look_is_offered_no_acts(closed, browser):
     context.close()
     assert offered["read"] == set()
     assert {"put-back", "relearn", "train", "maintain"} <= offered["operate"]
+    assert not {"edit", "remove"} & offered["operate"]
 
 
 def test_a_page_whose_session_is_over_leads_to_the_login(turned_out):

@@ -123,7 +123,8 @@ def test_open_pages_follow_what_is_changed_and_removed(page, fleet, server, brow
         its_page.get_by_role("heading", name="Bravo").wait_for()
         server.http.delete(path, headers=any_version).raise_for_status()
         page.locator("#row-beta").wait_for(state="detached")
-        its_page.get_by_text("there is no camera").wait_for()
+        its_page.get_by_text("This camera was removed.").wait_for()
+        assert its_page.locator("#camera").is_hidden()
         wrong.clear()  # the browser says of the page's 404
     assert shown(page) == ["Alpha"]
 

@@ -160,7 +160,8 @@ def _run() -> Iterator[_Run]:
 
 
 def _cameras(run: _Run) -> None:
-    run.ask("POST", "/cameras", CAMERA | {"reference_tracks": 200})
+    labels = {"site": "campus/north", "tags": ["nvr-east", "outdoor"]}
+    run.ask("POST", "/cameras", CAMERA | labels | {"reference_tracks": 200})
     bench = Bench(run.http, run.settings.model_copy(update={"window_tracks": 20}))
     with bench.store.write() as session:
         register_worker(session, "local-1", 1)

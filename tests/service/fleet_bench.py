@@ -46,8 +46,9 @@ class Fleet:
         self.store.close()
 
     def add(
-        self, camera_id, name=None, state="ok", *, tracks=40, estimates=60, wanted=200, **drift
-    ):
+        self, camera_id, name=None, state="ok", *, tracks=40, estimates=60, wanted=200,
+        site="", tags=(), **drift
+    ):  # fmt: skip
         """One camera; `drift` has tilt_deg, pan_deg and height_m."""
         with self.store.write() as session:
             spec = CameraSpec(
@@ -59,6 +60,8 @@ class Fleet:
                 walking_speed_mean_mps=1.4,
                 walking_speed_sd_mps=0.1,
                 reference_tracks=wanted,
+                site=site,
+                tags=tags,
             )
             register_camera(session, self.queue, self.settings, spec)
             for training in trainings.unfinished(session, camera_id):

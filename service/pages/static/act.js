@@ -42,7 +42,7 @@ const PLAIN = {
 export function plainly(reason, zone = document.body.dataset.zone) {
   const words = reason
     .replace(/^[a-z_.]+: /, "")
-    .replace(/, got [^,]*$/, "")
+    .replace(/, got (\[.*\]|[^,]*)$/, "")
     .replace(/\d{4}-\d\d-\d\dT[\d:.]+(Z|[+-]\d\d:\d\d)/g, (at) =>
       new Intl.DateTimeFormat("en-GB", { timeZone: zone, dateStyle: "medium", timeStyle: "short" }).format(new Date(at)),
     );

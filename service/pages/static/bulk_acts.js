@@ -1,13 +1,14 @@
 // One act with many alerts or cameras: POST /acts has an answer for each.
 
-import { call } from "./act.js";
+import { Refused, call } from "./act.js";
 import { done, planMaintenance, silenceOf } from "./alert_acts.js";
-import { ask, signed } from "./dialogs.js";
+import { ask, signed, wordsIn } from "./dialogs.js";
 
 const WORDS = {
   acknowledge: "Acknowledged.",
   silence: "Silenced.",
   maintenance: "Maintenance is planned.",
+  tag: "Tagged.",
   undo: "Taken back.",
 };
 const AT_ONCE = 500;
@@ -36,7 +37,14 @@ export async function withMany(act, cameras, after) {
   };
   if (act === "silence") return ask("silence-dialog", { send: (said) => send(silenceOf(said)) });
   if (act === "maintenance") return planMaintenance(send);
+  if (act === "tag") return ask("tag-dialog", { send: (said) => send(tagsOf(said)) });
   return send();
+}
+
+function tagsOf({ add, remove }) {
+  const more = { add: wordsIn(add), remove: wordsIn(remove) };
+  if (more.add.length || more.remove.length) return more;
+  throw new Refused({ errors: [{ pointer: "/add", reason: "a word is needed, here or below" }] });
 }
 
 async function alertsOf(cameras) {

@@ -18,7 +18,10 @@ for (const part of document.querySelectorAll("[data-part]")) was.set(part, part.
 /** Exchange the parts of the page that have changed; what is open stays open, focus stays. */
 async function refresh() {
   const answer = await fetch(location.href, { headers: { Accept: "text/html" } });
-  if (answer.status === 404) return location.reload(); // somebody has removed it
+  // Somebody has removed it; another may come under its id.
+  root.hidden = answer.status === 404;
+  document.getElementById("removed").hidden = !root.hidden;
+  if (root.hidden) document.title = "Removed · surefoot";
   if (!answer.ok || answer.redirected) return;
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
   document.title = fresh.title;

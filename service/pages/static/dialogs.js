@@ -86,6 +86,9 @@ export function ask(id, { keep = false, send = async () => true } = {}) {
   });
 }
 
+/** The words of a text, with blanks or commas between them. */
+export const wordsIn = (text) => text.split(/[\s,]+/).filter(Boolean);
+
 /** Say beside each field what is wrong with it, and below them what is of none. */
 export function showErrors(form, error) {
   const places = [...form.querySelectorAll("[data-error]")];
@@ -95,7 +98,7 @@ export function showErrors(form, error) {
   }
   if (!error) return;
   const reasons = error instanceof Refused ? (error.problem.errors ?? []) : [];
-  const fields = reasons.map(({ pointer, reason }) => [pointer.slice(1), plainly(reason, zone)]);
+  const fields = reasons.map(({ pointer, reason }) => [pointer.split("/")[1], plainly(reason, zone)]);
   const named = fields.filter(([name]) => places.some((each) => each.dataset.error === name));
   for (const [name, words] of named) {
     places.find((each) => each.dataset.error === name).textContent = words;

@@ -5,6 +5,7 @@ import { announce, call, guarded } from "./act.js";
 import { ALERT_ACTS, listen } from "./alert_acts.js";
 import { withMany } from "./bulk_acts.js";
 import { gathered, subscribe } from "./events.js";
+import { showPlaces, within } from "./places.js";
 import { keepTimes } from "./times.js";
 
 const list = document.getElementById("rows");
@@ -16,6 +17,7 @@ const pager = document.getElementById("pager");
 const chips = [...document.querySelectorAll(".chip")];
 const found = document.getElementById("found");
 const none = document.getElementById("none");
+const places = document.getElementById("places");
 const plainTitle = document.title.replace(/^\(\d+\) /, "");
 const PAGE = Number(list.dataset.page);
 const MOST_IDS = 100; // more in one address is too long
@@ -28,13 +30,20 @@ const index = new Map(); // what the service says of each camera
 const rows = new Map(); // the rows that have been fetched, by id
 const chosen = new Set();
 let states = new Set();
+const chosenPlace = { site: "", tags: new Set() };
 let page = 0;
 let wanted = []; // the ids of this page
 
-function note([id, name, state, rank, waiting, since, last, words]) {
-  const text = `${name} ${id} ${WORDS[state]} ${words}`.toLowerCase();
-  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text });
+/** Take a line of the index; a row says its place itself, the index by its number. */
+function note([id, name, state, rank, waiting, since, last, words, at], told = []) {
+  const place = told[at] ?? at;
+  const text = `${name} ${id} ${WORDS[state]} ${words} ${place}`.toLowerCase();
+  const site = place.split("#")[0].trim();
+  const tags = (place.match(/#\S+/g) ?? []).map((tag) => tag.slice(1));
+  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text, site, tags });
 }
+
+const noteAll = (told) => told.cameras.forEach((line) => note(line, told.places));
 
 const byName = (a, b) => (a.name < b.name ? -1 : a.name > b.name ? 1 : a.id < b.id ? -1 : 1);
 const ORDERS = {
@@ -42,13 +51,17 @@ const ORDERS = {
   name: byName,
   since: (a, b) => b.since - a.since || byName(a, b),
   last: (a, b) => (a.last ?? 0) - (b.last ?? 0) || byName(a, b),
+  site: (a, b) => (a.site < b.site ? -1 : a.site > b.site ? 1 : ORDERS[""](a, b)),
 };
+
+/** The cameras of the site and tags that are asked for. */
+const here = () => [...index.values()].filter((camera) => within(camera, chosenPlace));
 
 /** The cameras that are asked for, in their order. */
 function matching() {
   const words = search.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
   const fits = ({ state, text }) => (!states.size || states.has(state)) && words.every((word) => text.includes(word));
-  return [...index.values()].filter(fits).sort(ORDERS[sort.value] ?? ORDERS[""]);
+  return here().filter(fits).sort(ORDERS[sort.value] ?? ORDERS[""]);
 }
 
 /** Show the page that is asked for, and how many there are of each state. */
@@ -72,10 +85,9 @@ async function show() {
 function say(cameras) {
   const counts = {};
   let waiting = [...document.querySelectorAll("#banners [data-waiting]")].reduce((sum, each) => sum + Number(each.dataset.waiting), 0);
-  for (const { state, waiting: its } of index.values()) {
-    counts[state] = (counts[state] ?? 0) + 1;
-    waiting += its;
-  }
+  for (const { waiting: its } of index.values()) waiting += its;
+  for (const { state } of here()) counts[state] = (counts[state] ?? 0) + 1;
+  showPlaces(places, [...index.values()], chosenPlace);
   for (const chip of chips) {
     const count = counts[chip.dataset.state] ?? 0;
     chip.querySelector("b").textContent = count;
@@ -108,6 +120,8 @@ function ask() {
 function keepAddress() {
   const query = new URLSearchParams();
   if (search.value.trim()) query.set("q", search.value.trim());
+  if (chosenPlace.site) query.set("site", chosenPlace.site);
+  for (const tag of chosenPlace.tags) query.append("tag", tag);
   for (const state of states) query.append("state", state);
   if (sort.value) query.set("sort", sort.value);
   if (page) query.set("page", page + 1);
@@ -146,9 +160,9 @@ async function fetchRows(ids) {
 }
 
 async function fetchAll() {
-  const lines = await call("GET", "/ui/fleet/index");
+  const told = await call("GET", "/ui/fleet/index");
   index.clear();
-  lines.forEach(note);
+  noteAll(told);
   rows.clear();
   await show();
 }
@@ -203,6 +217,12 @@ for (const chip of chips) {
     ask();
   });
 }
+places.addEventListener("click", ({ target }) => {
+  const { site, tag } = target.closest("button")?.dataset ?? {};
+  if (site !== undefined) chosenPlace.site = site;
+  if (tag !== undefined && !chosenPlace.tags.delete(tag)) chosenPlace.tags.add(tag);
+  ask();
+});
 for (const [id, by] of [["back", -1], ["forth", 1]]) {
   document.getElementById(id).addEventListener("click", async () => {
     page += by;
@@ -243,12 +263,14 @@ bulk?.addEventListener("click", (event) => {
   if (button) guarded(button, () => withMany(button.dataset.bulk, [...chosen], () => choose([...chosen], false)));
 });
 
-JSON.parse(document.getElementById("index").textContent).forEach(note);
+noteAll(JSON.parse(document.getElementById("index").textContent));
 keep(list.querySelectorAll("li.row"));
 const asked = new URLSearchParams(location.search);
 search.value = asked.get("q") ?? "";
 sort.value = asked.get("sort") ?? "";
 states = new Set(asked.getAll("state").filter((state) => state in WORDS));
+chosenPlace.site = asked.get("site") ?? "";
+chosenPlace.tags = new Set(asked.getAll("tag"));
 page = Math.max(Number(asked.get("page") ?? 1) - 1 || 0, 0);
 show().catch(console.warn);
 performance.mark("usable"); // for tests.benchmarks.fleet

@@ -56,7 +56,7 @@ def test_every_act_is_kept_with_the_person_and_the_token(closed):
     assert closed.delete("/cameras/corner", headers=etag).status_code == 204
     for what in (
         "camera.registered",
-        "camera.changed",
+        "camera.described",
         "camera.removed",
         "reference.reset",
         "training.requested",

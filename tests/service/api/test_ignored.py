@@ -10,14 +10,14 @@ from tests.service.conftest import problem
 
 
 def test_a_registration_of_a_newer_client_is_taken(http):
-    body = copy.deepcopy(CAMERA) | {"site": "town/centre", "x" * 200: 1}
+    body = copy.deepcopy(CAMERA) | {"floor": "town/centre", "x" * 200: 1}
     body["intrinsics"]["skew"] = 0
     body["prior_pose"]["sd_deg"] = [1, {}]
     answer = http.post("/cameras", json=body)
     assert answer.status_code == 201
     assert answer.headers["location"] == "/cameras/corner"
     assert answer.headers["etag"]
-    names = ["site", "x" * 80, "intrinsics/skew", "prior_pose/sd_deg"]
+    names = ["floor", "x" * 80, "intrinsics/skew", "prior_pose/sd_deg"]
     assert answer.json()["ignored"] == names
     assert answer.json()["questions"] == []
     assert "ignored" not in http.get("/cameras/corner").json()

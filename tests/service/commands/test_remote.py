@@ -91,6 +91,10 @@ def test_cameras_of_some_states_are_listed(running, tmp_path):
     assert [line.split()[0] for line in told] == ["id", "busy", "new"]
     assert "learning, 30 of 200" in told[1]
     assert "\x1b" not in "".join(told)
+    running.fleet.add("yard", site="campus/north", tags=("ptz",))
+    told = ask(tmp_path, running, "cameras", "--site", "campus", "--tag", "ptz")
+    assert [line.split()[0] for line in told] == ["id", "yard"]
+    assert told[1].index("campus/north") == told[0].index("site")
     lines = ask(tmp_path, running, "cameras", "--json")
     assert [json.loads(line) for line in lines] == running.http.get("/cameras").json()["items"]
 

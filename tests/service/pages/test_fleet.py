@@ -58,9 +58,10 @@ def test_what_needs_a_person_comes_first(http, fleet):
     ]
     # The script sorts as the service does: by rank, then the newest, then by name.
     told = [json.loads(html_of.unescape(each)) for each in re.findall(r'data-line="([^"]+)"', html)]
-    assert told == json.loads(re.search(r'id="index">(.*?)</script>', html)[1])
+    index = json.loads(re.search(r'id="index">(.*?)</script>', html)[1])
+    assert told == [[*line[:-1], index["places"][line[-1]]] for line in index["cameras"]]
     assert [each[3] for each in told] == sorted(each[3] for each in told)
-    assert told == http.get("/ui/fleet/index").json()
+    assert index == http.get("/ui/fleet/index").json()
     assert "turned 3.1° (tilt +3.0°, pan −0.8°), " in words(html, "knocked")
     assert "cm lower" in words(html, "knocked")
     assert "seen by Ines" in words(html, "seen")
@@ -78,13 +79,33 @@ def test_a_page_of_many_has_as_many_rows_as_are_looked_at(http, fleet):
     html = http.get("/").text
     assert len(rows(html)) == 50
     index = re.search(r'id="index">(.*?)</script>', html)[1]
-    assert len(json.loads(index)) == 70
+    assert len(json.loads(index)["cameras"]) == 70
     assert len(index) < 70 * 90  # 2,000: 180 KB
     assert len(html) - len(index) < 110_000
     asked = http.get("/?state=ok&state=drifting&q=camera+c4").text
     assert {camera_id for _, camera_id in rows(asked)} == {"c40", "c42", "c44", "c46", "c48"}
     assert [i for _, i in rows(http.get("/?q=cam-c07").text)] == ["c07"]  # by its tracker
     assert len(rows(http.get("/?q=steady").text)) == 35  # by its state
+
+
+def test_sites_and_tags_are_shown_and_asked_for_in_the_address(http, fleet):
+    for n in range(60):
+        site = f"campus/{'north' if n % 2 else 'northeast'}/gate-{n % 5}"
+        fleet.add(f"c{n:02}", site=site, tags=("outdoor",), tracks=1, estimates=1)
+    fleet.add("quay", "Quay", tags=("outdoor", "ptz"))
+    fleet.add("bare")
+    html = http.get("/").text
+    index = re.search(r'id="index">(.*?)</script>', html)[1]
+    places = json.loads(index)["places"]
+    assert sorted(places)[:3] == ["", "#outdoor #ptz", "campus/north/gate-0 #outdoor"]
+    assert len(places) == 12  # each once: a camera names its own by a number
+    assert "c01 campus/north/gate-1 #outdoor" in words(http.get("/?q=c01").text, "c01")
+    assert "quay · #outdoor #ptz" in words(http.get("/?q=quay").text, "quay")
+    found = {i for _, i in rows(http.get("/?site=campus/north&q=gate-1").text)}
+    assert found == {f"c{n:02}" for n in range(1, 60, 2) if n % 5 == 1}
+    assert {i for _, i in rows(http.get("/?tag=outdoor&tag=ptz").text)} == {"quay"}
+    assert {i for _, i in rows(http.get("/?q=%23ptz").text)} == {"quay"}
+    assert rows(http.get("/?site=campus/nor").text) == []
 
 
 def test_flags_say_what_is_under_way(http, fleet):
