@@ -54,6 +54,7 @@ from service.pages import (
     health,
     reference,
     registration,
+    site_map,
 )
 from service.pages import webhooks as webhooks_page
 from service.settings import Settings
@@ -122,6 +123,7 @@ def create_app(settings: Settings) -> FastAPI:
         client,
         fleet,
         alerts_page,
+        site_map,
         camera_page,
         aim_page,
         connecting,

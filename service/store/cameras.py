@@ -308,6 +308,12 @@ def ids_labelled(
     return [camera_id for camera_id, own in rows if set(tags) <= set(own)]
 
 
+def sites(session: Session) -> Sequence[str]:
+    """All sites that somebody has said, in order."""
+    named = select(CameraRecord.site).where(CameraRecord.site.is_not(None)).distinct()
+    return [str(site) for site in session.scalars(named.order_by(CameraRecord.site))]
+
+
 def count(session: Session) -> int:
     """The number of cameras."""
     return session.scalar(select(func.count()).select_from(CameraRecord)) or 0

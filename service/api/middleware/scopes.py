@@ -51,6 +51,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "GET /ui/glossary",
         "GET /ui/health",
         "GET /ui/health/banner",
+        "GET /ui/map",
         "GET /wall",
         f"GET {VIEWER_SCRIPT_URL}",
         f"GET {VIEWER_STYLE_URL}",

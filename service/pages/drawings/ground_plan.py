@@ -18,10 +18,10 @@ from models.geometry.rotation import Array
 from service.pages.drawings.picture import Overlay, ground_of
 from service.pages.drawings.svg_paths import Frame, path_data, svg
 
-_SIZE_PX = 640.0
+SIZE_PX = 640.0
 _MARGIN_PX, _TRIED_MARGIN_PX = 18.0, 20.0
 _STRIP_PX = 26.0  # below the ground, for the scale and +Y
-_HEIGHT_PX = 470.0
+HEIGHT_PX = 470.0
 _FARTHEST = 30.0
 _SCALES_M = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
@@ -41,7 +41,7 @@ class Plan:
     @property
     def frame(self) -> Frame:
         """The edges of the paper."""
-        return Frame(left=0.0, top=0.0, right=_SIZE_PX, bottom=_HEIGHT_PX)
+        return Frame(left=0.0, top=0.0, right=SIZE_PX, bottom=HEIGHT_PX)
 
 
 def ground_plan_svg(
@@ -75,8 +75,8 @@ def ground_plan_svg(
     drawn = path_data((plan.on_paper(track) for track in walked), plan.frame)
     parts.append(f'<path class="track" d="{drawn}"/>')
     parts += [_stroke(plan, each) for each in misplaced]
-    parts += [_camera(plan, pose), _north(), _scale_bar(plan)]
-    return svg("picture plan", f"0 0 {_SIZE_PX:.0f} {_HEIGHT_PX:.0f}", label, parts)
+    parts += [_camera(plan, pose), north(), scale_bar(plan)]
+    return svg("picture plan", f"0 0 {SIZE_PX:.0f} {HEIGHT_PX:.0f}", label, parts)
 
 
 def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]) -> Markup:
@@ -86,15 +86,15 @@ def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]
         return Markup("")
     left, right = min(view.across_m[0], 0.0), max(view.across_m[1], 0.0)
     near, far = min(view.away_m[0], 0.0), view.away_m[1]
-    scale = (_SIZE_PX - 2 * _TRIED_MARGIN_PX) / max(right - left, far - near, 1e-6)
+    scale = (SIZE_PX - 2 * _TRIED_MARGIN_PX) / max(right - left, far - near, 1e-6)
     middle = (left + right) / 2
-    frame = Frame(left=0.0, top=0.0, right=_SIZE_PX, bottom=_SIZE_PX)
+    frame = Frame(left=0.0, top=0.0, right=SIZE_PX, bottom=SIZE_PX)
 
     def on_page(ground: Array) -> Array:
         local = (ground - view.foot_m) @ np.array([view.right, view.forward]).T
-        across = _SIZE_PX / 2 + (local[:, 0] - middle) * scale
+        across = SIZE_PX / 2 + (local[:, 0] - middle) * scale
         return np.stack(
-            [across, _SIZE_PX - _TRIED_MARGIN_PX - (local[:, 1] - near) * scale], axis=-1
+            [across, SIZE_PX - _TRIED_MARGIN_PX - (local[:, 1] - near) * scale], axis=-1
         )
 
     feet = [ground_from_pixel(lens, pose.rotation, pose.centre_m, uv)[0] for uv in tracks]
@@ -106,17 +106,17 @@ def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]
         f'<circle class="foot" cx="{u:.1f}" cy="{v:.1f}" r="7"/>',
     ]
     label = f"The ground from above; a square is {view.spacing_m:g} m"
-    return svg("picture", f"0 0 {_SIZE_PX:.0f} {_SIZE_PX:.0f}", label, parts)
+    return svg("picture", f"0 0 {SIZE_PX:.0f} {SIZE_PX:.0f}", label, parts)
 
 
 def plan_around(points_m: Array) -> Plan:
     """The paper that shows some points of the ground (N, 2), all of them."""
     (left, low), (right, high) = points_m.min(0).tolist(), points_m.max(0).tolist()
-    wide, tall = _SIZE_PX - 2 * _MARGIN_PX, _HEIGHT_PX - 2 * _MARGIN_PX - _STRIP_PX
+    wide, tall = SIZE_PX - 2 * _MARGIN_PX, HEIGHT_PX - 2 * _MARGIN_PX - _STRIP_PX
     px_per_m = min(wide / max(right - left, 1.0), tall / max(high - low, 1.0))
     return Plan(
-        left_m=(left + right - _SIZE_PX / px_per_m) / 2,
-        top_m=(low + high + (_HEIGHT_PX - _STRIP_PX) / px_per_m) / 2,
+        left_m=(left + right - SIZE_PX / px_per_m) / 2,
+        top_m=(low + high + (HEIGHT_PX - _STRIP_PX) / px_per_m) / 2,
         px_per_m=px_per_m,
     )
 
@@ -135,7 +135,7 @@ def _stroke(plan: Plan, each: Misplacement) -> str:
     stands = plan.on_paper(np.array([each.stands_m]))[0]
     x, y = stands
     words = f"{each.distance_m:.0f} m"
-    inside = 0 < x < _SIZE_PX and 0 < y < _HEIGHT_PX
+    inside = 0 < x < SIZE_PX and 0 < y < HEIGHT_PX
     if not inside:
         return ""
     line = ""
@@ -156,8 +156,9 @@ def _camera(plan: Plan, pose: CameraPose) -> str:
     )
 
 
-def _north() -> str:
-    x, y = _SIZE_PX - 14, _HEIGHT_PX - 8
+def north() -> str:
+    """The arrow that says where +Y is."""
+    x, y = SIZE_PX - 14, HEIGHT_PX - 8
     return (
         f'<path class="mark" d="M{x:.0f} {y}V{y - 22}M{x - 5:.0f} {y - 14}L{x:.0f} {y - 22}'
         f'L{x + 5:.0f} {y - 14}"/><text class="halo" x="{x - 9:.0f}" y="{y - 4}" '
@@ -165,10 +166,11 @@ def _north() -> str:
     )
 
 
-def _scale_bar(plan: Plan) -> str:
-    fits = [length for length in _SCALES_M if length * plan.px_per_m <= 0.28 * _SIZE_PX]
+def scale_bar(plan: Plan) -> str:
+    """A length on the ground, as long as fits well."""
+    fits = [length for length in _SCALES_M if length * plan.px_per_m <= 0.28 * SIZE_PX]
     length = fits[-1] if fits else _SCALES_M[0]
-    left, y, wide = 12.0, _HEIGHT_PX - 8, length * plan.px_per_m
+    left, y, wide = 12.0, HEIGHT_PX - 8, length * plan.px_per_m
     return (
         f'<path class="mark" d="M{left} {y - 5:.1f}V{y:.1f}H{left + wide:.1f}V{y - 5:.1f}"/>'
         f'<text class="halo" x="{left + wide + 8:.1f}" y="{y:.1f}">{length:g} m</text>'
