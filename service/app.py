@@ -21,6 +21,7 @@ from service.api import (
     maintenance,
     operation,
     poses,
+    reports,
     snapshots,
     sources,
     tokens,
@@ -54,6 +55,8 @@ from service.pages import (
     health,
     reference,
     registration,
+    report,
+    wall,
 )
 from service.pages import webhooks as webhooks_page
 from service.settings import Settings
@@ -118,6 +121,7 @@ def create_app(settings: Settings) -> FastAPI:
         webhooks,
         events,
         activity,
+        reports,
         operation,
         client,
         fleet,
@@ -128,6 +132,8 @@ def create_app(settings: Settings) -> FastAPI:
         registration,
         health,
         reference,
+        report,
+        wall,
         webhooks_page,
         tokens,
         access,

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from service.enums import Activity, AlertKind, Outcome
 from service.store import journal
-from service.store.access import actor_of
+from service.store.access import actor_of, address_of
 from service.store.journal import ActivityRecord
 
 
@@ -27,7 +27,7 @@ def note(
 ) -> None:
     """Keep what was done, in the transaction that does it.
 
-    Where it is known in whose name the session writes, that is who did it.
+    Where it is known in whose name the session writes, and for which address, that is kept.
 
     Args:
         session: of the activity itself: what is rolled back was not done.
@@ -48,6 +48,7 @@ def note(
         what=what,
         by=by if actor is None else actor.name,
         via=via if actor is None else actor.token_id,
+        address=address_of(session),
         camera_id=camera_id,
         subject_id=subject_id,
         kind=kind,

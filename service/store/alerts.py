@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import (
     JSON,
@@ -20,11 +20,19 @@ from sqlalchemy import (
     select,
     text,
 )
-from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
+from sqlalchemy.orm import Mapped, Session, aliased, defer, mapped_column
 
-from service.enums import AlertKind, AlertSource, AlertState, Answer, Outcome, Severity
+from service.enums import Activity, AlertKind, AlertSource, AlertState, Answer, Outcome, Severity
 from service.reasons import Reasons, code_of, values_of
-from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
+from service.store.journal import ActivityRecord
+from service.store.record import (
+    Record,
+    camera_key,
+    count_where,
+    delete_some,
+    foreign_key,
+    newest_first,
+)
 
 _IS_FIRING = f"state = '{AlertState.FIRING}'"
 
@@ -60,6 +68,7 @@ class AlertRecord(Record):
     updated_at: Mapped[datetime]
     acknowledged_by: Mapped[str | None]
     acknowledged_at: Mapped[datetime | None]
+    escalated_at: Mapped[datetime | None]
     silenced_until: Mapped[datetime | None]
     silence_reason: Mapped[str | None]
     silenced_by: Mapped[str | None]
@@ -222,6 +231,20 @@ def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:
     return session.scalars(_all_firing(AlertRecord.silenced_until <= now)).all()
 
 
+def unheeded(session: Session, since: datetime, now: datetime) -> Sequence[AlertRecord]:
+    """Open alerts that nobody has taken up since a time, told of last before it, and once yet."""
+    told_anew = exists().where(
+        ActivityRecord.subject_id == AlertRecord.id,
+        ActivityRecord.what.in_((Activity.ALERT_REOPENED, Activity.ALERT_SILENCE_ENDED)),
+        ActivityRecord.at > since,
+    )
+    return session.scalars(
+        _waiting(now).where(
+            AlertRecord.escalated_at.is_(None), AlertRecord.opened_at <= since, ~told_anew
+        )
+    ).all()
+
+
 def _all_firing(*conditions: ColumnElement[bool]) -> Select[AlertRecord]:
     return select(AlertRecord).where(AlertRecord.state == AlertState.FIRING, *conditions)
 
@@ -272,13 +295,59 @@ def listed(
     return session.scalars(query.order_by(*order).limit(limit)).all()
 
 
+class Opened(NamedTuple):
+    """When an alert was opened, of which kind and camera, and its outcome if it has one."""
+
+    opened_at: datetime
+    kind: AlertKind
+    camera_id: str | None
+    outcome: Outcome | None
+
+
+def opened_within(session: Session, since: datetime, before: datetime) -> Sequence[Opened]:
+    """All alerts that were opened between two times, a group for its members, oldest first."""
+    columns = (getattr(AlertRecord, name) for name in Opened._fields)
+    query = select(*columns).where(
+        AlertRecord.group_id.is_(None),
+        AlertRecord.opened_at >= since,
+        AlertRecord.opened_at < before,
+    )
+    return [Opened(*row) for row in session.execute(query.order_by(AlertRecord.opened_at))]
+
+
+def open_within(
+    session: Session, since: datetime, before: datetime, limit: int
+) -> Sequence[AlertRecord]:
+    """Alerts that were open at any time between two, a group for its members, newest first."""
+    query = (
+        select(AlertRecord).where(*_was_open(since, before)).options(defer(AlertRecord.evidence))
+    )
+    return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(limit)).all()
+
+
+def count_open_within(session: Session, since: datetime, before: datetime) -> int:
+    """The number of them."""
+    return count_where(session, *_was_open(since, before))
+
+
+def _was_open(since: datetime, before: datetime) -> tuple[ColumnElement[bool], ...]:
+    return (
+        AlertRecord.group_id.is_(None),
+        AlertRecord.opened_at < before,
+        or_(AlertRecord.resolved_at.is_(None), AlertRecord.resolved_at >= since),
+    )
+
+
 def count_waiting(session: Session, now: datetime) -> int:
     """Open alerts that nobody has taken up; a group counts for its members."""
+    return session.scalar(select(func.count()).select_from(_waiting(now).subquery())) or 0
+
+
+def _waiting(now: datetime) -> Select[AlertRecord]:
     quiet = and_(AlertRecord.silenced_until.is_not(None), AlertRecord.silenced_until > now)
-    waiting = _all_firing(
+    return _all_firing(
         AlertRecord.acknowledged_at.is_(None), not_(quiet), AlertRecord.group_id.is_(None)
     )
-    return session.scalar(select(func.count()).select_from(waiting.subquery())) or 0
 
 
 def forget(session: Session, before: datetime, limit: int) -> int:
