@@ -36,6 +36,6 @@ def require_period(begin: datetime, end: datetime) -> None:
     Raises:
         MalformedError: the first is not before the second, or they are a year and more apart.
     """
-    if not begin < end <= begin + _LONGEST:
+    if not timedelta(0) < end - begin <= _LONGEST:
         limit = f"a time before `to`, by at most {_LONGEST.days} days, is needed"
         raise MalformedError.of_field("from", f"{limit}, got {begin.isoformat()}")

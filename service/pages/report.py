@@ -5,6 +5,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
+from pydantic import Field
 
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
@@ -13,6 +14,7 @@ from service.reports.weekly import WEEK, make_report
 from service.wording.camera import STATES
 from service.wording.times import Clock
 
+Day = Annotated[date, Field(ge=date(2000, 1, 1), lt=date(3000, 1, 1))]
 router = APIRouter(include_in_schema=False)
 
 
@@ -21,8 +23,8 @@ def show(
     request: Request,
     state: StateDep,
     session: ReadDep,
-    from_: Annotated[date | None, Query(alias="from", description="the first day")] = None,
-    to: Annotated[date | None, Query(description="the last day")] = None,
+    from_: Annotated[Day | None, Query(alias="from", description="the first day")] = None,
+    to: Annotated[Day | None, Query(description="the last day")] = None,
 ) -> HTMLResponse:
     """The report of some days, whole ones by the cameras' clock; of the last seven, if unsaid."""
     clock = Clock(now=datetime.now(UTC), zone=state.settings.zone)

@@ -11,14 +11,14 @@ from sqlalchemy.orm import Session
 
 from service.cameras.status import alert_since, camera_statuses
 from service.degrees import in_degrees
-from service.enums import AlertKind, Outcome, PoseState, Severity
+from service.enums import AlertKind, Outcome, PoseState
 from service.settings import Settings
 from service.store import alerts, fleet
-from service.store.alerts import AlertRecord
+from service.store.alerts import AlertFilter, AlertRecord
 from service.wording.alerts import about_words, alert_line, done_words
 from service.wording.times import from_seconds
 
-_MOST_ALERTS = 1_000
+_MOST_ALERTS, _MOST_COUNTED = 1_000, 20_000
 _WEEKS, _OFTEN = 8, 10
 WEEK = timedelta(days=7)
 
@@ -34,13 +34,11 @@ class ReportedAlert:
     camera_id: str | None
     name: str
     kind: AlertKind
-    severity: Severity
     words: str
     drift: dict[str, Any]
     since: datetime
     opened_at: datetime
     acknowledged_by: str | None
-    escalated_at: datetime | None
     resolved_by: str | None
     resolved_at: datetime | None
     taken_up_after_s: float | None
@@ -61,24 +59,27 @@ class ReportedCamera:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WeekCount:
-    """Alerts that were opened in a week."""
+class Counts:
+    """Numbers of alerts that were opened: of all, of moves, and of those that were called false."""
 
-    begins_at: datetime
     alerts: int
     moved: int
     false_alarms: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CameraCount:
-    """Alerts of a camera in the weeks of a report."""
+class WeekCounts(Counts):
+    """Those of a week."""
+
+    begins_at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraCounts(Counts):
+    """Those of a camera."""
 
     camera_id: str
     name: str
-    alerts: int
-    moved: int
-    false_alarms: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +88,7 @@ class Report:
 
     `unsure`, `silent`, `unconnected` and `uncalibrated` are cameras as they stand when it is made.
     `weeks` are the eight that end with it, oldest first; `often` has the cameras with most alerts
-    in them. `left_out` are alerts beyond a thousand.
+    in them. `more` alerts were open than a thousand, of which the newest are here.
     """
 
     from_: Annotated[datetime, Field(serialization_alias="from")]
@@ -98,13 +99,13 @@ class Report:
     clocks: tuple[ReportedAlert, ...]
     others: tuple[ReportedAlert, ...]
     false_alarms: tuple[ReportedAlert, ...]
-    left_out: int
+    more: bool
     unsure: tuple[ReportedCamera, ...]
     silent: tuple[ReportedCamera, ...]
     unconnected: tuple[ReportedCamera, ...]
     uncalibrated: tuple[ReportedCamera, ...]
-    weeks: tuple[WeekCount, ...]
-    often: tuple[CameraCount, ...]
+    weeks: tuple[WeekCounts, ...]
+    often: tuple[CameraCounts, ...]
 
     @property
     def last_at(self) -> datetime:
@@ -125,17 +126,19 @@ def make_report(session: Session, settings: Settings, from_: datetime, to: datet
     """The report of what was between two times."""
     now = datetime.now(UTC)
     names = dict(fleet.names(session, None))
-    found = alerts.open_within(session, from_, to, _MOST_ALERTS)
-    sections = _by_section([_reported(record, names, now) for record in found])
+    wanted = AlertFilter(open_since=from_, opened_to=to)
+    found = _listed(session, wanted, now, _MOST_ALERTS + 1)
+    reported = [_reported(record, names, now) for record in found[:_MOST_ALERTS]]
     cameras = _by_state(session, settings, names)
-    opened = alerts.opened_within(session, _weeks_before(settings, to, _WEEKS), to)
+    since = _weeks_before(settings, to, _WEEKS)
+    opened = _listed(session, AlertFilter(opened_from=since, opened_to=to), now, _MOST_COUNTED)
     return Report(
         from_=from_,
         to=to,
         made_at=now,
         cameras=len(names),
-        **sections,
-        left_out=max(alerts.count_open_within(session, from_, to) - len(found), 0),
+        **_by_section(reported),
+        more=len(found) > _MOST_ALERTS,
         unsure=(*cameras[PoseState.UNSURE], *cameras[PoseState.SUSPECTED]),
         silent=tuple(cameras[PoseState.NO_DATA]),
         unconnected=tuple(cameras[PoseState.UNCONNECTED]),
@@ -145,6 +148,12 @@ def make_report(session: Session, settings: Settings, from_: datetime, to: datet
     )
 
 
+def _listed(session: Session, wanted: AlertFilter, now: datetime, limit: int) -> list[AlertRecord]:
+    """Alerts, newest first; a group speaks for its members."""
+    found = alerts.listed(session, wanted, now, limit, lean=True)
+    return [record for record in found if record.group_id is None]
+
+
 def _reported(record: AlertRecord, names: dict[str, str], now: datetime) -> ReportedAlert:
     taken_up = [at for at in (record.acknowledged_at, record.resolved_at) if at is not None]
     return ReportedAlert(
@@ -152,13 +161,11 @@ def _reported(record: AlertRecord, names: dict[str, str], now: datetime) -> Repo
         camera_id=record.camera_id,
         name=about_words(record, names),
         kind=record.kind,
-        severity=record.severity,
         words=alert_line(record),
         drift=in_degrees(record.drift),
         since=alert_since(record),
         opened_at=record.opened_at,
         acknowledged_by=record.acknowledged_by,
-        escalated_at=record.escalated_at,
         resolved_by=record.resolved_by,
         resolved_at=record.resolved_at,
         taken_up_after_s=_after_s(record, min(taken_up, default=None)),
@@ -203,19 +210,17 @@ def _weeks_before(settings: Settings, at: datetime, weeks: int) -> datetime:
     return (at.astimezone(settings.zone) - weeks * WEEK).astimezone(UTC)
 
 
-def _week(
-    settings: Settings, to: datetime, back: int, opened: Sequence[alerts.Opened]
-) -> WeekCount:
+def _week(settings: Settings, to: datetime, back: int, opened: Sequence[AlertRecord]) -> WeekCounts:
     begins_at, ends_at = (_weeks_before(settings, to, weeks) for weeks in (back, back - 1))
     mine = [each for each in opened if begins_at <= each.opened_at < ends_at]
-    return WeekCount(begins_at=begins_at, **_counts(mine))
+    return WeekCounts(begins_at=begins_at, **_counts(mine))
 
 
-def _often(opened: Sequence[alerts.Opened], names: dict[str, str]) -> list[CameraCount]:
+def _often(opened: Sequence[AlertRecord], names: dict[str, str]) -> list[CameraCounts]:
     """The cameras with most alerts, of those that had two or more."""
     most = Counter(each.camera_id for each in opened if each.camera_id is not None)
     return [
-        CameraCount(
+        CameraCounts(
             camera_id=camera_id,
             name=names.get(camera_id, camera_id),
             **_counts([each for each in opened if each.camera_id == camera_id]),
@@ -225,7 +230,7 @@ def _often(opened: Sequence[alerts.Opened], names: dict[str, str]) -> list[Camer
     ]
 
 
-def _counts(opened: Sequence[alerts.Opened]) -> dict[str, int]:
+def _counts(opened: Sequence[AlertRecord]) -> dict[str, int]:
     false = sum(each.outcome == Outcome.FALSE_ALARM for each in opened)
     moved = sum(
         each.kind == AlertKind.DRIFT and each.outcome != Outcome.FALSE_ALARM for each in opened

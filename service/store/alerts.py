@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy import (
     JSON,
@@ -28,7 +28,6 @@ from service.store.journal import ActivityRecord
 from service.store.record import (
     Record,
     camera_key,
-    count_where,
     delete_some,
     foreign_key,
     newest_first,
@@ -146,6 +145,7 @@ class AlertFilter:
     group_id: str | None = None
     opened_from: datetime | None = None
     opened_to: datetime | None = None
+    open_since: datetime | None = None
     before: tuple[datetime, str] | None = None
     acknowledged: bool | None = None
     silenced: bool | None = None
@@ -264,9 +264,9 @@ def answered_at(session: Session, camera_id: str) -> datetime | None:
 
 
 def listed(
-    session: Session, wanted: AlertFilter, now: datetime, limit: int
+    session: Session, wanted: AlertFilter, now: datetime, limit: int, *, lean: bool = False
 ) -> Sequence[AlertRecord]:
-    """Alerts, newest first."""
+    """Alerts, newest first; without what each is by, which is most of it, where that is `lean`."""
     named = ("state", "severity", "camera_id", "group_id")
     chosen = {name: getattr(wanted, name) for name in named if getattr(wanted, name) is not None}
     query = select(AlertRecord).filter_by(**chosen)
@@ -276,6 +276,9 @@ def listed(
         query = query.where(AlertRecord.opened_at >= wanted.opened_from)
     if wanted.opened_to is not None:
         query = query.where(AlertRecord.opened_at < wanted.opened_to)
+    if wanted.open_since is not None:
+        ended_at = AlertRecord.resolved_at
+        query = query.where(or_(ended_at.is_(None), ended_at >= wanted.open_since))
     if wanted.before is not None:
         opened_at, alert_id = wanted.before
         query = query.where(
@@ -291,51 +294,10 @@ def listed(
         until = AlertRecord.silenced_until
         silent = and_(until.is_not(None), until > now)
         query = query.where(silent if wanted.silenced else not_(silent))
+    if lean:
+        query = query.options(defer(AlertRecord.evidence))
     order = AlertRecord.opened_at.desc(), AlertRecord.id.desc()
     return session.scalars(query.order_by(*order).limit(limit)).all()
-
-
-class Opened(NamedTuple):
-    """When an alert was opened, of which kind and camera, and its outcome if it has one."""
-
-    opened_at: datetime
-    kind: AlertKind
-    camera_id: str | None
-    outcome: Outcome | None
-
-
-def opened_within(session: Session, since: datetime, before: datetime) -> Sequence[Opened]:
-    """All alerts that were opened between two times, a group for its members, oldest first."""
-    columns = (getattr(AlertRecord, name) for name in Opened._fields)
-    query = select(*columns).where(
-        AlertRecord.group_id.is_(None),
-        AlertRecord.opened_at >= since,
-        AlertRecord.opened_at < before,
-    )
-    return [Opened(*row) for row in session.execute(query.order_by(AlertRecord.opened_at))]
-
-
-def open_within(
-    session: Session, since: datetime, before: datetime, limit: int
-) -> Sequence[AlertRecord]:
-    """Alerts that were open at any time between two, a group for its members, newest first."""
-    query = (
-        select(AlertRecord).where(*_was_open(since, before)).options(defer(AlertRecord.evidence))
-    )
-    return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(limit)).all()
-
-
-def count_open_within(session: Session, since: datetime, before: datetime) -> int:
-    """The number of them."""
-    return count_where(session, *_was_open(since, before))
-
-
-def _was_open(since: datetime, before: datetime) -> tuple[ColumnElement[bool], ...]:
-    return (
-        AlertRecord.group_id.is_(None),
-        AlertRecord.opened_at < before,
-        or_(AlertRecord.resolved_at.is_(None), AlertRecord.resolved_at >= since),
-    )
 
 
 def count_waiting(session: Session, now: datetime) -> int:

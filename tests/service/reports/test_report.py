@@ -35,7 +35,7 @@ def ids(items):
 
 def test_alerts_of_the_days_by_what_they_are_and_what_was_done(copenhagen):
     body = weekly(copenhagen)
-    assert (body["from"], body["to"], body["cameras"], body["left_out"]) == (BEGIN, END, 3, 0)
+    assert (body["from"], body["to"], body["cameras"], body["more"]) == (BEGIN, END, 3, False)
     (knock,) = body["moved"]
     assert (knock["alert_id"], knock["name"], knock["words"]) == ("a", "Corner 1", "tilt +3.0°")
     assert knock["drift"]["tilt_deg"] == pytest.approx(3.0, abs=1e-4)
@@ -107,4 +107,5 @@ def test_days_that_are_none_are_refused(copenhagen):
     assert "a time before `to`" in problem(wrong, 422, "malformed")["errors"][0]["reason"]
     far = copenhagen.get("/reports/weekly", params={"from": "2020-01-01T00:00:00Z", "to": END})
     problem(far, 422, "malformed")
-    problem(copenhagen.get("/ui/report?from=2026-03-29&to=2026-03-01"), 422, "malformed")
+    for days in ("from=2026-03-29&to=2026-03-01", "to=9999-12-31", "from=0001-01-01"):
+        problem(copenhagen.get(f"/ui/report?{days}"), 422, "malformed")
