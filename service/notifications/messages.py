@@ -159,7 +159,7 @@ def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> di
         **{f"drift_{name}": f"{value:g}" for name, value in _numbers(body["drift"]).items()},
     }
     for name in ("acknowledged_by", "escalated_at", "outcome"):
-        if body[name]:
+        if body.get(name):
             annotations[name] = body[name]
     if zones := body.get("zones"):
         least = sorted(zones, key=itemgetter("overlap"))[:_ZONES]
