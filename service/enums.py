@@ -283,3 +283,4 @@ class Activity(StrEnum):
     SESSION_BEGAN = "session.began"
     SESSION_ENDED = "session.ended"
     LOGIN_REFUSED = "login.refused"
+    SETTINGS_CHANGED = "settings.changed"

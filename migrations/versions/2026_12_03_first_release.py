@@ -32,10 +32,9 @@ ACTIVITY = (
     "alert.silenced alert.silence_ended alert.resolved alert.reopened maintenance.planned "
     "maintenance.changed maintenance.ended maintenance.withdrawn maintenance.over "
     "training.requested training.succeeded training.failed training.cancelled snapshot.kept "
-    "snapshot.removed "
-    "zones.drawn webhook.added webhook.changed webhook.secret_changed webhook.removed "
-    "webhook.tested webhook.replayed token.added token.revoked session.began session.ended "
-    "login.refused"
+    "snapshot.removed zones.drawn webhook.added webhook.changed webhook.secret_changed "
+    "webhook.removed webhook.tested webhook.replayed token.added token.revoked session.began "
+    "session.ended login.refused settings.changed"
 )
 
 

@@ -147,6 +147,12 @@ def newest_of(
     return session.scalars(query.limit(1)).first()
 
 
+def newest_of_kind(session: Session, what: Activity) -> ActivityRecord | None:
+    """The newest entry of a kind; None where there is none."""
+    query = select(ActivityRecord).where(ActivityRecord.what == what)
+    return session.scalars(query.order_by(ActivityRecord.id.desc()).limit(1)).first()
+
+
 def activity_of_subject(session: Session, subject_id: str) -> Sequence[ActivityRecord]:
     """The entries of an alert, a training or a window, oldest first."""
     query = select(ActivityRecord).where(ActivityRecord.subject_id == subject_id)

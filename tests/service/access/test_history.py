@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 
 from service.access import tokens
-from service.access.activity import note
+from service.access.activity import note, note_settings
 from service.access.tokens import TokenSpec
 from service.alerts.alerts import open_alert
 from service.alerts.escalation import escalate
@@ -38,6 +38,7 @@ BY_ITSELF = {
     Activity.TRAINING_SUCCEEDED,
     Activity.TRAINING_FAILED,
     Activity.LOGIN_REFUSED,
+    Activity.SETTINGS_CHANGED,
 }
 ANY = {"If-Match": "*"}
 
@@ -180,6 +181,8 @@ def test_every_kind_of_act_is_kept_with_who_when_and_from_where(ada):
     look_after_cameras(ada, bench)
     train(ada, bench)
     look_after_others(ada)
+    with bench.store.write() as session:
+        note_settings(session, ada.settings)
     lines = csv_of(ada)
     assert {line["what"] for line in lines} == set(Activity)
     for line in lines[1:]:  # the first made ada's own token, by nobody
@@ -194,6 +197,27 @@ def test_every_kind_of_act_is_kept_with_who_when_and_from_where(ada):
     assert named["details"].startswith("{")  # no cell is a formula
     bench.store.close()
     bench.queue.close()
+
+
+def test_settings_are_kept_where_they_are_others_than_before_and_no_secret(http, settings):
+    store = Store(settings)
+    started = [
+        settings.model_copy(update={"drift_people": 20, "mqtt_password": "a pass word"}),
+        settings.model_copy(update={"drift_people": 20, "mqtt_password": "another"}),
+        settings.model_copy(update={"drift_people": 30}),
+        settings.model_copy(),
+    ]
+    for each in started:
+        with store.write() as session:
+            note_settings(session, each)
+    entries = http.get("/activity").json()["items"]
+    own = {name: entries[-1]["details"].get(name) for name in entries[-1]["details"]}
+    assert [entry["details"] for entry in entries] == [
+        {**own, "drift_people": "20", "mqtt_password": "set"},
+        {**own, "drift_people": "30"},
+        own,
+    ]
+    assert "pass word" not in str(entries)
 
 
 def test_days_are_chosen_and_a_file_goes_on_from_a_cursor(http, settings):
