@@ -40,7 +40,7 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
         clock=clock,
         alerts=firing[:_MOST],
         more=len(firing[_MOST:]),
-        waiting=sum(alert.acknowledged_at is None for alert in firing),
+        waiting=[_told_as(alert) for alert in firing if alert.acknowledged_at is None],
         seen=sum(alert.acknowledged_at is not None for alert in firing),
         cameras=cameras.count(session),
         names=_names(session, firing[:_MOST]),
@@ -53,6 +53,11 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
 def _order(alert: AlertRecord) -> tuple[bool, bool, float]:
     seen, mild = alert.acknowledged_at is not None, alert.severity != Severity.CRITICAL
     return seen, mild, -alert_since(alert).timestamp()
+
+
+def _told_as(alert: AlertRecord) -> str:
+    """What is news once: an alert, and its escalation."""
+    return f"{alert.id}-escalated" if alert.escalated_at else alert.id
 
 
 def _names(session: Session, shown: list[AlertRecord]) -> dict[str, str]:

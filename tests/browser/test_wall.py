@@ -5,6 +5,7 @@ import re
 import pytest
 
 from tests.browser.conftest import axe, shoot, too_wide
+from tests.running import wait_for
 from tests.service.fleet_bench import Fleet
 
 pytestmark = pytest.mark.slow
@@ -67,11 +68,11 @@ OscillatorNode.prototype.start = function (...when) {
 def test_a_sound_is_switched_on_and_told_apart_from_the_news_before(page, server):
     expect = pytest.importorskip("playwright.sync_api").expect
     fleet = Fleet(server.settings)
-    for n in range(3):
+    for n in range(13):
         fleet.add(f"c{n}", tilt_deg=3.0)
     page.add_init_script(SPY)
     page.goto("/ui/wall")
-    page.wait_for_function("document.getElementById('age').textContent")
+    expect(page.locator("#age")).not_to_be_empty()
     fleet.knock("c0")
     expect(page.locator("#wall li")).to_have_count(1)
     assert page.evaluate("tones") == 0  # off until somebody wants it
@@ -79,9 +80,19 @@ def test_a_sound_is_switched_on_and_told_apart_from_the_news_before(page, server
     assert page.evaluate("tones") == 2  # so that one hears that it is on
     fleet.knock("c1")
     expect(page.locator("#wall li")).to_have_count(2)
-    page.wait_for_function("tones === 4")
+    wait_for(lambda: page.evaluate("tones") == 4)
+    for n in range(3, 12):
+        fleet.knock(f"c{n}")
+    expect(page.get_by_role("heading")).to_contain_text("11 need a person")
+    heard = page.evaluate("tones")
+    fleet.knock("c12", severity="warning")  # beyond the lines that are shown
+    wait_for(lambda: page.evaluate("tones") == heard + 2)
+    (first,) = server.http.get("/alerts?camera_id=c0").json()["items"]
+    server.http.post(f"/alerts/{first['id']}/resolve", json={"outcome": "put_back"})
+    expect(page.get_by_role("heading")).to_contain_text("11 need a person")
+    assert page.evaluate("tones") == heard + 2  # what comes into sight is no news
     page.get_by_role("button", name="Sound: on").click()
     fleet.knock("c2")
-    expect(page.locator("#wall li")).to_have_count(3)
-    assert page.evaluate("tones") == 4
+    expect(page.get_by_role("heading")).to_contain_text("12 need a person")
+    assert page.evaluate("tones") == heard + 2
     fleet.close()

@@ -10,7 +10,7 @@ const clock = new Intl.DateTimeFormat("sv-SE", { timeZone: zone, hour: "2-digit"
 const wall = document.getElementById("wall");
 const age = document.getElementById("age");
 const sound = document.getElementById("sound");
-const idsOf = () => [...wall.querySelectorAll("li.critical, li.warning")].map((row) => row.dataset.id);
+const idsOf = () => wall.dataset.waiting.split(" ").filter(Boolean);
 
 let heard = performance.now(); // a clock that nobody sets
 let live = true;
@@ -24,7 +24,7 @@ async function refresh() {
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
   const made = fresh.getElementById("wall");
   wall.replaceChildren(...made.childNodes);
-  wall.dataset.made = made.dataset.made;
+  Object.assign(wall.dataset, made.dataset);
   document.title = fresh.title;
   heard = performance.now();
   const ids = idsOf();
