@@ -26,9 +26,9 @@ NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
 ALERT_KINDS = "drift no_data clock unsure stale tracker picture"
 OUTCOMES = "put_back accepted mended relearned false_alarm cleared camera_removed"
 ACTIVITY = (
-    "camera.registered camera.changed camera.removed pose.agreed pose.accepted pose.put_back "
-    "pose.mended pose.false_alarm pose.undone reference.reset reference.learned source.used "
-    "source.removed alert.opened alert.grew alert.escalated alert.acknowledged "
+    "camera.registered camera.changed camera.described camera.removed pose.agreed pose.accepted "
+    "pose.put_back pose.mended pose.false_alarm pose.undone reference.reset reference.learned "
+    "source.used source.removed alert.opened alert.grew alert.escalated alert.acknowledged "
     "alert.silenced alert.silence_ended alert.resolved alert.reopened maintenance.planned "
     "maintenance.changed maintenance.ended maintenance.withdrawn maintenance.over "
     "training.requested training.succeeded training.failed training.cancelled snapshot.kept "

@@ -124,7 +124,8 @@ def look_after_cameras(http, bench):
     ask(http, "DELETE", "/cameras/corner/snapshot")
     door = {"id": "door", "on": "ground", "points": [[300, 400], [500, 410], [480, 600]]}
     ask(http, "PUT", "/cameras/corner/zones", json={"zones": [door]}, headers=ANY)
-    ask(http, "PATCH", "/cameras/corner", json={"name": "The other corner"}, headers=ANY)
+    for change in ({"name": "The other corner"}, {"walking_speed": {"mean_mps": 1.3}}):
+        ask(http, "PATCH", "/cameras/corner", json=change, headers=ANY)
     bare = {name: value for name, value in CAMERA.items() if name != "prior_pose"}
     ask(http, "POST", "/cameras", json=bare | {"id": "gate"})
     with bench.store.write() as session:
