@@ -21,6 +21,7 @@ from service.api import (
     maintenance,
     operation,
     poses,
+    reports,
     snapshots,
     sources,
     tokens,
@@ -54,7 +55,9 @@ from service.pages import (
     health,
     reference,
     registration,
+    report,
     site_map,
+    wall,
 )
 from service.pages import webhooks as webhooks_page
 from service.settings import Settings
@@ -119,6 +122,7 @@ def create_app(settings: Settings) -> FastAPI:
         webhooks,
         events,
         activity,
+        reports,
         operation,
         client,
         fleet,
@@ -130,6 +134,8 @@ def create_app(settings: Settings) -> FastAPI:
         registration,
         health,
         reference,
+        report,
+        wall,
         webhooks_page,
         tokens,
         access,

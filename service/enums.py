@@ -142,6 +142,7 @@ class AlertActivity(StrEnum):
     """Acts on an alert."""
 
     OPENED = "opened"
+    GREW = "grew"
     ESCALATED = "escalated"
     ACKNOWLEDGED = "acknowledged"
     SILENCED = "silenced"
@@ -188,9 +189,11 @@ class MessageType(StrEnum):
 
     ALERT_OPENED = "alert.opened"
     ALERT_UPDATED = "alert.updated"
+    ALERT_ESCALATED = "alert.escalated"
     ALERT_ACKNOWLEDGED = "alert.acknowledged"
     ALERT_SILENCED = "alert.silenced"
     ALERT_RESOLVED = "alert.resolved"
+    REPORT = "report.weekly"
     TEST = "test"
 
 
@@ -250,6 +253,7 @@ class Activity(StrEnum):
     SOURCE_USED = "source.used"
     SOURCE_REMOVED = "source.removed"
     ALERT_OPENED = "alert.opened"
+    ALERT_GREW = "alert.grew"
     ALERT_ESCALATED = "alert.escalated"
     ALERT_ACKNOWLEDGED = "alert.acknowledged"
     ALERT_SILENCED = "alert.silenced"
@@ -279,3 +283,4 @@ class Activity(StrEnum):
     SESSION_BEGAN = "session.began"
     SESSION_ENDED = "session.ended"
     LOGIN_REFUSED = "login.refused"
+    SETTINGS_CHANGED = "settings.changed"

@@ -2,6 +2,7 @@
 
 import base64
 import os
+import re
 from collections.abc import Callable
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from urllib.parse import urlsplit
@@ -9,9 +10,11 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import AfterValidator, ValidationError
 
-_SECRETS = ("secret_key", "proxy_secret", "database_url", "mqtt_password")
+_SECRETS = ("secret_key", "proxy_secret", "database_url", "mqtt_password", "smtp_password")
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 
+WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
+_ADDRESS = re.compile(r"[!-?A-~]+@[!-?A-~]+")  # of printable ASCII; what takes it knows the rest
 _MOST_WORKERS = 4  # unless more are asked for: each holds 240 MB
 
 
@@ -103,6 +106,18 @@ def read_camera_names(text: str) -> dict[str, str]:
             raise ValueError(f"name=camera-id, with commas, is needed, got {part!r:.80}")
         names[name] = camera_id
     return names
+
+
+def read_addresses(text: str) -> tuple[str, ...]:
+    """The mail addresses of a text, with commas.
+
+    Raises:
+        ValueError: one of them is none.
+    """
+    found = tuple(part.strip() for part in text.split(",") if part.strip())
+    if not all(_ADDRESS.fullmatch(each) for each in found):
+        raise ValueError(f"addresses as name@host, with commas, are needed, got {text!r:.80}")
+    return found
 
 
 def read_delays(text: str) -> tuple[float, ...]:

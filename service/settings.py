@@ -124,6 +124,11 @@ class Settings(BaseSettings):
     )
     drift_clear_ratio: float = Field(0.7, gt=0, le=1, description="alert clears below this share")
 
+    escalate_after_min: float | None = Field(
+        None,
+        gt=0,
+        description="minutes until an alert that nobody took up is told of once more; unset: never",
+    )
     silence_max_days: float = Field(30.0, gt=0, description="longest silence of an alert")
     maintenance_max_days: float = Field(30.0, gt=0, description="longest maintenance window")
     group_cameras: int = Field(3, ge=2, description="cameras of a tracker that make one alert")
@@ -190,6 +195,25 @@ class Settings(BaseSettings):
     keep_deliveries_days: float = Field(
         30.0, gt=0, description="age at which ended deliveries are deleted"
     )
+    report_day: Literal[*values.WEEKDAYS] | None = Field(  # type: ignore[valid-type]
+        None, description="day of the weekly report, to webhooks and by mail; unset: none is sent"
+    )
+    report_hour: int = Field(7, ge=0, le=23, description="and its hour, by TIMEZONE")
+    report_from: Annotated[str, values.readable(values.read_addresses)] = Field(
+        "", description="address that reports are mailed from"
+    )
+    report_to: Annotated[str, values.readable(values.read_addresses)] = Field(
+        "", description="addresses, with commas, that reports are mailed to"
+    )
+    smtp_host: str | None = Field(None, description="mail server; unset: nothing is mailed")
+    smtp_port: int | None = Field(
+        None, ge=1, le=65535, description="its port; unset: 587 for starttls, 465 for tls, else 25"
+    )
+    smtp_tls: Literal["starttls", "tls", "off"] = Field(
+        "starttls", description="whether mail is sent in the open: only by `off`, and no password"
+    )
+    smtp_user: str | None = Field(None, description="user at the mail server")
+    smtp_password: str | None = Field(None, repr=False, description="and the password")
     public_url: str | None = Field(None, description="where people reach this service, for links")
 
     mqtt_url: Annotated[str, values.readable(values.read_mqtt_url)] | None = Field(
@@ -298,6 +322,20 @@ class Settings(BaseSettings):
     def _proxies_prove_themselves(cls, value: str, info: ValidationInfo) -> str:
         if value and info.data.get("proxy_secret") is None:
             raise ValueError("SUREFOOT_PROXY_SECRET is needed, too: an address alone proves little")
+        return value
+
+    @field_validator("smtp_host")
+    @classmethod
+    def _mail_has_both_ends(cls, value: str | None, info: ValidationInfo) -> str | None:
+        if value is not None and not (info.data.get("report_from") and info.data.get("report_to")):
+            raise ValueError("SUREFOOT_REPORT_FROM and SUREFOOT_REPORT_TO are needed, too")
+        return value
+
+    @field_validator("smtp_password")
+    @classmethod
+    def _password_is_sealed(cls, value: str | None, info: ValidationInfo) -> str | None:
+        if value is not None and info.data.get("smtp_tls") == "off":
+            raise ValueError("it is sent over TLS alone, and SUREFOOT_SMTP_TLS is off")
         return value
 
     @property

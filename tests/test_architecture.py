@@ -20,6 +20,7 @@ SERVICE_ROOMS = [
     {"estimate_queue", "references", "notifications"},
     {"alerts", "training"},
     {"cameras", "estimation"},
+    {"reports"},
     {"operations", "workers"},
     {"api"},
     {"pages"},

@@ -28,13 +28,13 @@ OUTCOMES = "put_back accepted mended relearned false_alarm cleared camera_remove
 ACTIVITY = (
     "camera.registered camera.changed camera.described camera.removed pose.agreed pose.accepted "
     "pose.put_back pose.mended pose.false_alarm pose.undone reference.reset reference.learned "
-    "source.used source.removed alert.opened alert.escalated alert.acknowledged alert.silenced "
-    "alert.silence_ended alert.resolved alert.reopened maintenance.planned maintenance.changed "
-    "maintenance.ended maintenance.withdrawn maintenance.over training.requested "
-    "training.succeeded training.failed training.cancelled snapshot.kept snapshot.removed "
-    "zones.drawn webhook.added webhook.changed webhook.secret_changed webhook.removed "
-    "webhook.tested webhook.replayed token.added token.revoked session.began session.ended "
-    "login.refused"
+    "source.used source.removed alert.opened alert.grew alert.escalated alert.acknowledged "
+    "alert.silenced alert.silence_ended alert.resolved alert.reopened maintenance.planned "
+    "maintenance.changed maintenance.ended maintenance.withdrawn maintenance.over "
+    "training.requested training.succeeded training.failed training.cancelled snapshot.kept "
+    "snapshot.removed zones.drawn webhook.added webhook.changed webhook.secret_changed "
+    "webhook.removed webhook.tested webhook.replayed token.added token.revoked session.began "
+    "session.ended login.refused settings.changed"
 )
 
 
@@ -333,7 +333,7 @@ table(
     *optional(DateTime, "changed_after", "changed_at"),
     *needed(DateTime, "updated_at"),
     *optional(String, "acknowledged_by"),
-    *optional(DateTime, "acknowledged_at", "silenced_until"),
+    *optional(DateTime, "acknowledged_at", "escalated_at", "silenced_until"),
     *optional(String, "silence_reason", "silenced_by"),
     *optional(DateTime, "resolved_at"),
     *optional(String, "resolved_by", "outcome", "note"),
@@ -401,7 +401,8 @@ table(
     *optional(DateTime, "finished_at"),
     one_of(
         "type",
-        "alert.opened alert.updated alert.acknowledged alert.silenced alert.resolved test",
+        "alert.opened alert.updated alert.escalated alert.acknowledged alert.silenced "
+        "alert.resolved report.weekly test",
     ),
     one_of("state", "pending delivered failed"),
     Index(None, "webhook_id", "state", "number"),
@@ -431,7 +432,7 @@ table(
     key("id", NUMBER),
     *needed(DateTime, "at"),
     *needed(String, "what"),
-    *optional(String, "by", "via"),
+    *optional(String, "by", "via", "address"),
     *optional(String(64), "camera_id", "subject_id"),
     *optional(String, "kind"),
     *optional(DateTime, "until"),
@@ -471,6 +472,14 @@ table(
     *needed(NUMBER, "beats", "starts"),
     *needed(Boolean, "lost"),
     *optional(String, "trouble"),
+)
+table(
+    "reports",
+    key("id", String(32)),
+    *needed(DateTime, "due_at", "made_at"),
+    *needed(String, "subject", "text"),
+    *optional(DateTime, "mailed_at"),
+    *optional(String, "error"),
 )
 table("store_probes", key("id", NUMBER), *needed(DateTime, "written_at"))
 

@@ -6,8 +6,9 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.enums import Activity, AlertKind, Outcome
+from service.settings import Settings
 from service.store import journal
-from service.store.access import actor_of
+from service.store.access import actor_of, address_of
 from service.store.journal import ActivityRecord
 
 
@@ -27,7 +28,7 @@ def note(
 ) -> None:
     """Keep what was done, in the transaction that does it.
 
-    Where it is known in whose name the session writes, that is who did it.
+    Where it is known in whose name the session writes, and for which address, that is kept.
 
     Args:
         session: of the activity itself: what is rolled back was not done.
@@ -48,6 +49,7 @@ def note(
         what=what,
         by=by if actor is None else actor.name,
         via=via if actor is None else actor.token_id,
+        address=address_of(session),
         camera_id=camera_id,
         subject_id=subject_id,
         kind=kind,
@@ -57,3 +59,18 @@ def note(
         details=details or {},
     )
     journal.append(session, record)
+
+
+def note_settings(session: Session, settings: Settings) -> None:
+    """Keep the settings that are no defaults, where they are others than at the last start.
+
+    Of a secret, that it is set.
+    """
+    given = {
+        name: str(value) if field.repr else "set"
+        for name, field in Settings.model_fields.items()
+        if (value := getattr(settings, name)) != field.get_default(call_default_factory=True)
+    }
+    last = journal.newest_of_kind(session, Activity.SETTINGS_CHANGED)
+    if given != ({} if last is None else last.details):
+        note(session, Activity.SETTINGS_CHANGED, by=None, details=given)

@@ -38,6 +38,7 @@ _EVENT_FIELDS = (
 # What messages say of an activity; that an alert grew is told with what made it grow.
 _NOTIFIED_AS = {
     AlertActivity.OPENED: MessageType.ALERT_OPENED,
+    AlertActivity.ESCALATED: MessageType.ALERT_ESCALATED,
     AlertActivity.ACKNOWLEDGED: MessageType.ALERT_ACKNOWLEDGED,
     AlertActivity.SILENCED: MessageType.ALERT_SILENCED,
     AlertActivity.SILENCE_ENDED: MessageType.ALERT_UPDATED,
@@ -76,7 +77,7 @@ def open_alert(
         changed = (record.severity, record.source) != (severity, source)
         change = MessageType.ALERT_UPDATED if changed else None
         if (record.severity, severity) == (Severity.WARNING, Severity.CRITICAL):
-            _keep_activity(session, record, AlertActivity.ESCALATED, None)
+            _keep_activity(session, record, AlertActivity.GREW, None)
         record.changed_at = changed_at or record.changed_at
         record.changed_after = changed_after or record.changed_after
     else:
@@ -163,7 +164,7 @@ def reopen_alert(session: Session, record: AlertRecord, by: str | None) -> None:
     if group is not None and group.state != AlertState.FIRING:
         record.group_id = None
     record.state, record.outcome = AlertState.FIRING, None
-    record.note = record.resolved_by = record.resolved_at = None
+    record.note = record.resolved_by = record.resolved_at = record.escalated_at = None
     note_on_alert(session, record, AlertActivity.REOPENED, by)
 
 

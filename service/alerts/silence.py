@@ -52,6 +52,7 @@ def end_silences(session: Session) -> None:
 
 def _lift(session: Session, record: AlertRecord, by: str | None, reason: str | None) -> None:
     record.silenced_until = record.silence_reason = record.silenced_by = None
+    record.escalated_at = None  # told anew, it waits for somebody anew
     note_on_alert(session, record, AlertActivity.SILENCE_ENDED, by, note=reason)
 
 

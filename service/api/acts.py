@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from service.alerts import alerts, silence
 from service.api.ignored import NamingRoute
 from service.api.labels import MOST_TAGS, Tags
-from service.api.middleware.dependencies import AppState, CallerDep, StateDep
+from service.api.middleware.dependencies import AddressDep, AppState, CallerDep, StateDep
 from service.api.schemas import Body, Moment, Text, Who
 from service.cameras import cameras, decisions, maintenance, undo
 from service.cameras.answers import Decision
@@ -76,7 +76,7 @@ router = APIRouter(tags=["alerts"], route_class=NamingRoute)
 
 
 @router.post("/acts")
-def act(body: ActsBody, state: StateDep, caller: CallerDep) -> ActsOut:
+def act(body: ActsBody, state: StateDep, caller: CallerDep, address: AddressDep) -> ActsOut:
     """Do one act with many alerts or cameras. Each is a transaction: what one refuses stops none.
 
     `acknowledge`, `silence` and `resolve` take ids of alerts, all others ids of cameras.
@@ -86,7 +86,7 @@ def act(body: ActsBody, state: StateDep, caller: CallerDep) -> ActsOut:
         about = one if body.act in _OF_CAMERAS else None
         try:
             with state.store.write(about) as session:
-                set_actor(session, caller)
+                set_actor(session, caller, address)
                 _DO[body.act](session, state, one, body)
         except ServiceError as error:  # of this id alone; the others are still to be done
             said = ActProblem(status=error.status, code=error.code, detail=error.detail)

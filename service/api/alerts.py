@@ -10,7 +10,6 @@ from pydantic import BaseModel, BeforeValidator, Field
 from sqlalchemy.orm import Session
 
 from service.alerts import alerts, silence
-from service.api.alerts_csv import AlertFormat, alerts_csv
 from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import (
@@ -25,6 +24,7 @@ from service.api.schemas import (
     Text,
     Who,
 )
+from service.api.spreadsheet import CSV, FileFormat, csv_lines, saved_as
 from service.cameras import decisions
 from service.degrees import in_degrees
 from service.enums import (
@@ -87,6 +87,7 @@ class AlertOut(BaseModel):
     acknowledged: bool = False
     acknowledged_by: str | None
     acknowledged_at: datetime | None
+    escalated_at: datetime | None
     silenced: bool = False
     silenced_until: datetime | None
     silence_reason: str | None
@@ -271,9 +272,12 @@ def chosen_alerts(
 
 
 ChosenDep = Annotated[AlertFilter, Depends(chosen_alerts)]
-CSV = "text/csv"
+_COLUMNS = (
+    *("id", "camera_id", "kind", "state", "severity", "reason", "opened_at", "changed_at"),
+    *("acknowledged_by", "acknowledged_at", "escalated_at", "silenced_until", "silenced_by"),
+    *("resolved_at", "resolved_by", "outcome", "note", "track_source", "group_id"),
+)
 _MOST_LINES = 10_000
-_SAVED = {"Content-Disposition": 'attachment; filename="alerts.csv"'}
 router = APIRouter(prefix="/alerts", tags=["alerts"], route_class=NamingRoute)
 
 
@@ -283,14 +287,15 @@ def list_all(
     session: ReadDep,
     chosen: ChosenDep,
     format_: Annotated[
-        AlertFormat | None, Query(alias="format", description="a file for a spreadsheet")
+        FileFormat | None, Query(alias="format", description="a file for a spreadsheet")
     ] = None,
     limit: Annotated[int | None, Query(ge=1, le=10_000, description="1,000 of JSON")] = None,
 ) -> AlertList | Response:
     """Alerts, newest first: 100 a page if unsaid, of CSV 10,000. A browser is led to the page."""
-    if format_ == AlertFormat.CSV:
-        found = alerts.list_alerts(session, chosen, limit or _MOST_LINES)
-        return Response(alerts_csv(found), media_type=CSV, headers=_SAVED)
+    if format_ == FileFormat.CSV:
+        found = map(alert_body, alerts.list_alerts(session, chosen, limit or _MOST_LINES))
+        lines = csv_lines([_COLUMNS, *([body[name] for name in _COLUMNS] for body in found)])
+        return Response(lines, media_type=CSV, headers=saved_as("alerts.csv"))
     if "text/html" in request.headers.get("accept", ""):
         query = f"?{request.url.query}" if request.url.query else ""
         return RedirectResponse(f"/ui/alerts{query}", status_code=303)

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from service.api.middleware.dependencies import (
+    AddressDep,
     BodyDep,
     CallerDep,
     ReadDep,
@@ -53,6 +54,7 @@ def put(
     still: Annotated[Still, Depends(read_body)],
     state: StateDep,
     caller: CallerDep,
+    address: AddressDep,
     taken_at: Annotated[Moment | None, Query(description="now, if not given")] = None,
 ) -> SnapshotOut:
     """Take a still image of what the camera sees, made anew without EXIF, at most 1920 px wide.
@@ -60,7 +62,7 @@ def put(
     It is compared with the pictures before it, and kept where the settings say so.
     """
     with state.store.write(camera_id) as session:
-        set_actor(session, caller)
+        set_actor(session, caller, address)
         facts = snapshots.put_snapshot(session, state.queue, camera_id, still, taken_at)
     return SnapshotOut.model_validate(facts)
 

@@ -12,13 +12,16 @@ from datetime import UTC, datetime
 from functools import partial
 
 import uvicorn
+from sqlalchemy.exc import SQLAlchemyError
 
+from service.access.activity import note_settings
 from service.access.bridge_token import TOKEN_ID, renew_bridge_token
 from service.api.middleware.connections import ConnectionGuard, GuardedProtocol
 from service.api.middleware.hosts import auth_on, is_loopback
 from service.commands.local_bridge import TOKEN_VARIABLE, LocalBridge
 from service.commands.migrate import migrate
 from service.data_dir import StartError, held_alone, make_private
+from service.errors import ServiceError
 from service.settings import Settings
 from service.store import access
 from service.store.engines.store import Store
@@ -48,6 +51,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
     with held_alone(settings.data_dir), contextlib.closing(listen(settings)) as listener:
         migrate(settings)
         _require_way_in(settings)
+        _keep_settings(settings)
         with importing():  # half of what is imported, and who is refused is told without it
             from service.app import create_app
 
@@ -104,6 +108,15 @@ def _require_way_in(settings: Settings) -> None:
             "NAME --scope admin` with the same data directory, or let everybody in by "
             "SUREFOOT_AUTH=off"
         )
+
+
+def _keep_settings(settings: Settings) -> None:
+    """Have the log of what was done know other settings; on a full disk, it is served without."""
+    try:
+        with contextlib.closing(Store(settings)) as store:
+            store.write_if_needed(None, partial(note_settings, settings=settings))
+    except (SQLAlchemyError, ServiceError) as error:
+        log.warning("settings_not_kept", extra={"error": str(error)})
 
 
 def _bridge_token(settings: Settings) -> str | None:

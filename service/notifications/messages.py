@@ -158,8 +158,8 @@ def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> di
         "alert_id": body["id"],
         **{f"drift_{name}": f"{value:g}" for name, value in _numbers(body["drift"]).items()},
     }
-    for name in ("acknowledged_by", "outcome"):
-        if body[name]:
+    for name in ("acknowledged_by", "escalated_at", "outcome"):
+        if body.get(name):
             annotations[name] = body[name]
     if zones := body.get("zones"):
         least = sorted(zones, key=itemgetter("overlap"))[:_ZONES]

@@ -30,6 +30,7 @@ _ALERT_FIELDS = (
         "updated_at",
         "acknowledged_by",
         "acknowledged_at",
+        "escalated_at",
     ),
     *("silenced_until", "silence_reason", "silenced_by", "resolved_at", "resolved_by"),
     *("outcome", "note", "track_source", "camera_ids", "group_id"),

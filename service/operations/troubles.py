@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
-from service.store import cameras, tracks, webhooks, workers
+from service.store import cameras, reports, tracks, webhooks, workers
 from service.store.engines.dialects import now_in
 
 LONGEST_LAG = timedelta(seconds=60)
@@ -27,6 +27,7 @@ def find_troubles(session: Session, settings: Settings) -> list[Trouble]:
         *_of_workers(session, settings),
         *_of_the_queue(session),
         *_of_webhooks(session),
+        *_of_reports(session, settings),
     ]
 
 
@@ -74,3 +75,11 @@ def _of_webhooks(session: Session) -> list[Trouble]:
         for record in webhooks.every(session)
         if record.failing_since is not None
     ]
+
+
+def _of_reports(session: Session, settings: Settings) -> list[Trouble]:
+    last = reports.newest(session, datetime.now(UTC)) if settings.smtp_host else None
+    if last is None or last.error is None:
+        return []
+    words = f"The mail server did not take the weekly report: {last.error}"
+    return [Trouble(words=words, since=last.made_at)]

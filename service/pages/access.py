@@ -16,6 +16,7 @@ from service.access import sessions, tokens
 from service.access.tokens import MadeToken, TokenSpec
 from service.api.middleware.authentication import COOKIE, is_proxy, refuse
 from service.api.middleware.dependencies import (
+    AddressDep,
     AppState,
     CallerDep,
     ReadDep,
@@ -37,7 +38,7 @@ from service.errors import (
     UnsupportedMediaTypeError,
 )
 from service.settings import Settings
-from service.store.access import name_in
+from service.store.access import name_in, set_actor
 
 _MOST_BYTES = 16 * 1024
 _MOST_FIELDS = 100
@@ -94,7 +95,7 @@ def show_login(request: Request, state: StateDep, next: str = "") -> Response:
 
 
 @router.post("/ui/login")
-def log_in(request: Request, form: FormDep, state: StateDep) -> Response:
+def log_in(request: Request, form: FormDep, state: StateDep, address: AddressDep) -> Response:
     """Begin a session, and go on to where the person wanted to."""
     wanted = _ours(form.one("next"))
     if not auth_on(state.settings):
@@ -105,6 +106,7 @@ def log_in(request: Request, form: FormDep, state: StateDep) -> Response:
     except (UnauthorizedError, ForbiddenError) as error:
         return _refused(request, wanted, error)
     with state.store.write() as session:
+        set_actor(session, caller, address)
         cookie = sessions.log_in(session, state.settings, caller)
     answer = RedirectResponse(wanted or "/", status_code=303)
     answer.set_cookie(

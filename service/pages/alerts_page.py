@@ -7,7 +7,7 @@ from typing import Annotated
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
-from fastapi.responses import HTMLResponse, RedirectResponse
+from fastapi.responses import HTMLResponse
 
 from service.access.tokens import Caller
 from service.alerts.alerts import list_alerts
@@ -43,12 +43,6 @@ class AlertRow:
 
 
 router = APIRouter(include_in_schema=False)
-
-
-@router.get("/wall")
-def wall() -> RedirectResponse:
-    """What is on walls: the alerts that fire."""
-    return RedirectResponse("/ui/alerts", status_code=303)
 
 
 @router.get("/ui/alerts")
@@ -130,14 +124,9 @@ def _csv(asked: Sequence[tuple[str, str]], state: AlertState | None) -> str:
 
 
 def _row(record: AlertRecord, names: dict[str, str], clock: Clock) -> AlertRow:
-    if record.camera_id is None:
-        count = len(record.camera_ids or ())
-        name = f"{count} cameras of {record.track_source}"
-    else:
-        name = names.get(record.camera_id, record.camera_id)
     return AlertRow(
         alert=record,
-        name=name,
+        name=alert_words.about_words(record, names),
         words=alert_words.alert_line(record),
         since=alert_since(record),
         flags=fleet_alert_flags(record, clock.now),

@@ -94,7 +94,7 @@ def forget_sessions(session: Session, now: datetime) -> None:
     session.execute(delete(SessionRecord).where(SessionRecord.expires_at <= now))
 
 
-_KEY = "surefoot.actor"
+_KEY, _ADDRESS = "surefoot.actor", "surefoot.address"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,9 +105,9 @@ class Actor:
     token_id: str | None
 
 
-def set_actor(session: Session, actor: Actor | None) -> None:
-    """Let a session write in somebody's name."""
-    session.info[_KEY] = actor
+def set_actor(session: Session, actor: Actor | None, address: str | None) -> None:
+    """Let a session write in somebody's name, who asks from an address."""
+    session.info[_KEY], session.info[_ADDRESS] = actor, address
 
 
 def name_in(session: Session, said: str | None) -> str | None:
@@ -120,3 +120,9 @@ def actor_of(session: Session) -> Actor | None:
     """In whose name a session writes; None where nobody is known, or the service acts."""
     actor: Actor | None = session.info.get(_KEY)
     return actor
+
+
+def address_of(session: Session) -> str | None:
+    """The address from which somebody asks for what a session writes; None where nobody does."""
+    address: str | None = session.info.get(_ADDRESS)
+    return address

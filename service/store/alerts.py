@@ -20,11 +20,18 @@ from sqlalchemy import (
     select,
     text,
 )
-from sqlalchemy.orm import Mapped, Session, aliased, mapped_column
+from sqlalchemy.orm import Mapped, Session, aliased, defer, mapped_column
 
-from service.enums import AlertKind, AlertSource, AlertState, Answer, Outcome, Severity
+from service.enums import Activity, AlertKind, AlertSource, AlertState, Answer, Outcome, Severity
 from service.reasons import Reasons, code_of, values_of
-from service.store.record import Record, camera_key, delete_some, foreign_key, newest_first
+from service.store.journal import ActivityRecord
+from service.store.record import (
+    Record,
+    camera_key,
+    delete_some,
+    foreign_key,
+    newest_first,
+)
 
 _IS_FIRING = f"state = '{AlertState.FIRING}'"
 
@@ -60,6 +67,7 @@ class AlertRecord(Record):
     updated_at: Mapped[datetime]
     acknowledged_by: Mapped[str | None]
     acknowledged_at: Mapped[datetime | None]
+    escalated_at: Mapped[datetime | None]
     silenced_until: Mapped[datetime | None]
     silence_reason: Mapped[str | None]
     silenced_by: Mapped[str | None]
@@ -137,6 +145,7 @@ class AlertFilter:
     group_id: str | None = None
     opened_from: datetime | None = None
     opened_to: datetime | None = None
+    open_since: datetime | None = None
     before: tuple[datetime, str] | None = None
     acknowledged: bool | None = None
     silenced: bool | None = None
@@ -222,6 +231,20 @@ def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:
     return session.scalars(_all_firing(AlertRecord.silenced_until <= now)).all()
 
 
+def unheeded(session: Session, since: datetime, now: datetime) -> Sequence[AlertRecord]:
+    """Open alerts that nobody has taken up since a time, told of last before it, and once yet."""
+    told_anew = exists().where(
+        ActivityRecord.subject_id == AlertRecord.id,
+        ActivityRecord.what.in_((Activity.ALERT_REOPENED, Activity.ALERT_SILENCE_ENDED)),
+        ActivityRecord.at > since,
+    )
+    return session.scalars(
+        _waiting(now).where(
+            AlertRecord.escalated_at.is_(None), AlertRecord.opened_at <= since, ~told_anew
+        )
+    ).all()
+
+
 def _all_firing(*conditions: ColumnElement[bool]) -> Select[AlertRecord]:
     return select(AlertRecord).where(AlertRecord.state == AlertState.FIRING, *conditions)
 
@@ -241,9 +264,9 @@ def answered_at(session: Session, camera_id: str) -> datetime | None:
 
 
 def listed(
-    session: Session, wanted: AlertFilter, now: datetime, limit: int
+    session: Session, wanted: AlertFilter, now: datetime, limit: int, *, lean: bool = False
 ) -> Sequence[AlertRecord]:
-    """Alerts, newest first."""
+    """Alerts, newest first; without what each is by, which is most of it, where that is `lean`."""
     named = ("state", "severity", "camera_id", "group_id")
     chosen = {name: getattr(wanted, name) for name in named if getattr(wanted, name) is not None}
     query = select(AlertRecord).filter_by(**chosen)
@@ -253,6 +276,9 @@ def listed(
         query = query.where(AlertRecord.opened_at >= wanted.opened_from)
     if wanted.opened_to is not None:
         query = query.where(AlertRecord.opened_at < wanted.opened_to)
+    if wanted.open_since is not None:
+        ended_at = AlertRecord.resolved_at
+        query = query.where(or_(ended_at.is_(None), ended_at >= wanted.open_since))
     if wanted.before is not None:
         opened_at, alert_id = wanted.before
         query = query.where(
@@ -268,17 +294,22 @@ def listed(
         until = AlertRecord.silenced_until
         silent = and_(until.is_not(None), until > now)
         query = query.where(silent if wanted.silenced else not_(silent))
+    if lean:
+        query = query.options(defer(AlertRecord.evidence))
     order = AlertRecord.opened_at.desc(), AlertRecord.id.desc()
     return session.scalars(query.order_by(*order).limit(limit)).all()
 
 
 def count_waiting(session: Session, now: datetime) -> int:
     """Open alerts that nobody has taken up; a group counts for its members."""
+    return session.scalar(select(func.count()).select_from(_waiting(now).subquery())) or 0
+
+
+def _waiting(now: datetime) -> Select[AlertRecord]:
     quiet = and_(AlertRecord.silenced_until.is_not(None), AlertRecord.silenced_until > now)
-    waiting = _all_firing(
+    return _all_firing(
         AlertRecord.acknowledged_at.is_(None), not_(quiet), AlertRecord.group_id.is_(None)
     )
-    return session.scalar(select(func.count()).select_from(waiting.subquery())) or 0
 
 
 def forget(session: Session, before: datetime, limit: int) -> int:

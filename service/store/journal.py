@@ -34,8 +34,10 @@ class EventRecord(Record):
 class ActivityRecord(Record):
     """An act of somebody, or of the service where `by` is None.
 
+    `via` is the token's id, `address` where the request came from.
+
     `camera_id` refers to nothing, so that it stays when the camera goes; `subject_id` is the
-    alert's, training's or window's, `via` the token's. `kind` and `outcome` are an alert's, `until`
+    alert's, training's or window's. `kind` and `outcome` are an alert's, `until`
     of a silence or of maintenance; `note` has the words that were given. Triggers refuse changes,
     and deletions of what is younger than 30 days.
     """
@@ -47,6 +49,7 @@ class ActivityRecord(Record):
     what: Mapped[Activity]
     by: Mapped[str | None]
     via: Mapped[str | None]
+    address: Mapped[str | None]
     camera_id: Mapped[str | None] = mapped_column(String(64))
     subject_id: Mapped[str | None] = mapped_column(String(64))
     kind: Mapped[AlertKind | None]
@@ -110,14 +113,24 @@ def forget_events(session: Session, keep: int, limit: int) -> int:
 
 
 def activity_after(
-    session: Session, camera_id: str | None, entry_id: int, limit: int
+    session: Session,
+    camera_id: str | None,
+    entry_id: int,
+    limit: int,
+    *,
+    since: datetime | None = None,
+    before: datetime | None = None,
 ) -> Sequence[ActivityRecord]:
-    """Entries after one, oldest first; of a camera, or of everything."""
+    """Entries after one, oldest first; of a camera, or of everything; of all times, or some."""
     query = select(ActivityRecord).where(
         ActivityRecord.id > entry_id, *_settled(session, ActivityRecord)
     )
     if camera_id is not None:
         query = query.where(ActivityRecord.camera_id == camera_id)
+    if since is not None:
+        query = query.where(ActivityRecord.at >= since)
+    if before is not None:
+        query = query.where(ActivityRecord.at < before)
     return session.scalars(query.order_by(ActivityRecord.id).limit(limit)).all()
 
 
@@ -132,6 +145,12 @@ def newest_of(
     """The newest entry of a camera that is one of some; None where there is none."""
     query = newest_first(ActivityRecord, camera_id).where(ActivityRecord.what.in_(what))
     return session.scalars(query.limit(1)).first()
+
+
+def newest_of_kind(session: Session, what: Activity) -> ActivityRecord | None:
+    """The newest entry of a kind; None where there is none."""
+    query = select(ActivityRecord).where(ActivityRecord.what == what)
+    return session.scalars(query.order_by(ActivityRecord.id.desc()).limit(1)).first()
 
 
 def activity_of_subject(session: Session, subject_id: str) -> Sequence[ActivityRecord]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 from service.enums import Activity, AlertKind, AlertSource, Answer, Outcome
@@ -10,7 +11,7 @@ from service.store.estimates import EstimateRecord
 from service.store.journal import ActivityRecord
 from service.wording.moves import NAMES, offset_words
 from service.wording.reasons import in_words, percent
-from service.wording.times import Clock
+from service.wording.times import Clock, duration
 
 KINDS = {
     AlertKind.DRIFT: "The camera moved",
@@ -125,7 +126,8 @@ _DONE = {
 }
 _HAPPENED = {
     Activity.ALERT_OPENED: "Alert: {kind}",
-    Activity.ALERT_ESCALATED: "It grew: {alert} is critical now",
+    Activity.ALERT_GREW: "It grew: {alert} is critical now",
+    Activity.ALERT_ESCALATED: "Nobody took up {alert}: it was told once more",
     Activity.REFERENCE_LEARNED: "The reference was learned",
     Activity.MAINTENANCE_OVER: "The maintenance is over",
     Activity.TRAINING_SUCCEEDED: "A training ended: its model is in use",
@@ -168,6 +170,30 @@ def alert_line(alert: AlertRecord) -> str:
     if alert.kind == AlertKind.DRIFT and (moved := offset_words(alert.drift)):
         return moved
     return in_words(alert.reasons)
+
+
+def about_words(alert: AlertRecord, names: Mapping[str, str]) -> str:
+    """The camera that an alert is about by its name, or how many of which tracker."""
+    if alert.camera_id is None:
+        return f"{len(alert.camera_ids or ())} cameras of {alert.track_source}"
+    return names.get(alert.camera_id, alert.camera_id)
+
+
+def done_words(alert: AlertRecord, now: datetime) -> str:
+    """What was done about an alert, by whom, after how long: "put back by Ada after 3 hours"."""
+
+    def after(at: datetime) -> str:
+        return duration((at - alert.opened_at).total_seconds())
+
+    if alert.resolved_at is not None and alert.outcome is not None:
+        by = f" by {alert.resolved_by}" if alert.resolved_by else ""
+        return f"{OUTCOMES[alert.outcome]}{by} after {after(alert.resolved_at)}"
+    if alert.acknowledged_at is not None:
+        seen = f"seen by {alert.acknowledged_by} after {after(alert.acknowledged_at)}"
+        return f"{seen}, open for {after(now)}"
+    if alert.is_silenced(now):
+        return f"silenced by {alert.silenced_by}, open for {after(now)}"
+    return f"nobody took it up in {after(now)}"
 
 
 def answers(kind: AlertKind) -> list[AnswerWords]:

@@ -6,7 +6,7 @@ from datetime import datetime
 
 from models.monitoring.verdict import Drift
 from models.reasons import Reason
-from service.enums import AlertKind, PoseState
+from service.enums import AlertKind, AlertState, PoseState
 from service.reasons import ServiceCode
 from service.store.alerts import MOVED_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
@@ -258,6 +258,9 @@ def fleet_alert_flags(alert: AlertRecord, now: datetime) -> tuple[str, ...]:
     flags = []
     if alert.acknowledged_by is not None:
         flags.append(f"seen by {alert.acknowledged_by}")
+    elif alert.escalated_at is not None and alert.state == AlertState.FIRING:
+        waits_s = (now - alert.opened_at).total_seconds()
+        flags.append(f"escalated: nobody took it up in {duration(waits_s)}")
     if alert.silenced_until is not None and alert.is_silenced(now):
         flags.append(f"silenced for {duration((alert.silenced_until - now).total_seconds())} more")
     if alert.group_id is not None:

@@ -36,6 +36,20 @@ class Clock:
         """A time with its date and zone."""
         return f"{at.astimezone(self.zone):%Y-%m-%d %H:%M %Z}"
 
+    def dated(self, at: datetime) -> str:
+        """A time with its day, that is read weeks later: "Mon 23 Nov, 14:32"."""
+        local = at.astimezone(self.zone)
+        return f"{local:%a} {local.day} {local:%b}, {local:%H:%M}"
+
+    def day(self, at: datetime) -> str:
+        """A day: "23 Nov 2026"."""
+        local = at.astimezone(self.zone)
+        return f"{local.day} {local:%b} {local.year}"
+
+    def iso_day(self, at: datetime) -> str:
+        """The same as addresses and forms have it."""
+        return f"{at.astimezone(self.zone):%Y-%m-%d}"
+
     def ago(self, at: datetime) -> str:
         """An age, or in how long a time comes; `times.js` says the same as time goes on."""
         if self.now - _JUST_NOW[0] < at <= self.now + _JUST_NOW[1]:

@@ -12,6 +12,7 @@ from service.settings import Settings
 from tests.conftest import CAMERA, Once
 from tests.service.bench import Bench
 from tests.service.notifications.post_room import PostRoom
+from tests.service.notifications.receiver import Receiver, receiver
 from tests.service.street import Street
 from tests.stores import databases
 
@@ -84,6 +85,13 @@ def problem(answer: httpx.Response, status: int, code: str) -> dict[str, Any]:
     document: dict[str, Any] = answer.json()
     assert (document["status"], document["code"]) == (status, code)
     return document
+
+
+@pytest.fixture
+def inbox() -> Iterator[Receiver]:
+    """A receiver of webhooks."""
+    with receiver() as found:
+        yield found
 
 
 @pytest.fixture

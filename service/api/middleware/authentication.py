@@ -33,6 +33,7 @@ from service.errors import (
 )
 from service.settings import Settings
 from service.store import access
+from service.store.access import set_actor
 from service.store.engines.store import Store
 
 log = logging.getLogger("surefoot.access")
@@ -166,8 +167,8 @@ def refuse(request: Request) -> None:
         log.warning("login_refused", extra={"address": request.state.address})
         try:
             with request.state.app.store.write("refused/") as session:
-                details = {"address": request.state.address}  # and never with what
-                note(session, Activity.LOGIN_REFUSED, by=None, details=details)
+                set_actor(session, None, request.state.address)  # and never with what
+                note(session, Activity.LOGIN_REFUSED, by=None)
         except (SQLAlchemyError, ServiceError) as error:
             log.warning("refusal_not_kept", extra={"error": str(error)})
     if failure.wait_s:

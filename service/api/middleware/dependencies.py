@@ -70,14 +70,25 @@ async def get_caller(request: Request) -> Caller | None:
 CallerDep = Annotated[Caller | None, Depends(get_caller)]
 
 
-def write_session(request: Request, state: StateDep, caller: CallerDep) -> Iterator[Session]:
+async def get_address(request: Request) -> str:
+    """The address that a request came from."""
+    address: str = request.state.address
+    return address
+
+
+AddressDep = Annotated[str, Depends(get_address)]
+
+
+def write_session(
+    request: Request, state: StateDep, caller: CallerDep, address: AddressDep
+) -> Iterator[Session]:
     """A session that commits before the answer is sent, or not at all.
 
     It writes about the camera that the path names, or about everything; and in the name of the
     caller, whatever name a body says.
     """
     with state.store.write(request.path_params.get("camera_id")) as session:
-        set_actor(session, caller)
+        set_actor(session, caller, address)
         yield session
 
 

@@ -1,8 +1,8 @@
 """The periodic work of the workers: one of them does it, by the monotonic clock.
 
 Which one is told by a lock, that is let go of however its holder ends: no clock has a say in it.
-What is done each hour has a thread of its own: it may take minutes, and alerts and deliveries do
-not wait for it.
+What is done each hour, and reports, have a thread of their own: they may take minutes, and alerts
+and deliveries do not wait for them.
 """
 
 import logging
@@ -26,6 +26,7 @@ from service.workers import engine
 from service.workers.context import UPKEEP, JobContext
 from service.workers.processes.workers import take_setback
 from service.workers.upkeep.reconciliation import run_reconcile, run_sweep
+from service.workers.upkeep.reports import ReportRounds
 from service.workers.upkeep.retention import run_retention
 from service.workers.upkeep.snapshots import SnapshotRounds
 
@@ -35,6 +36,7 @@ _SHORTEST_REST_S, _ASK_S = 0.05, 1.0
 _SWEEP_S = 0.5
 _CLOCK_S = 1.0
 _SNAPSHOTS_S = 2.0
+_REPORTS_S = 10.0
 _FIRST_HOURLY_S = 120.0  # a service that is restarted every half an hour has its turn too
 _JUMP_S = 2.0
 
@@ -118,8 +120,9 @@ def _quick(context: JobContext, now_s: float) -> list[Periodic]:
 
 
 def _hourly(context: JobContext, now_s: float) -> list[Periodic]:
-    hourly_s = now_s + _FIRST_HOURLY_S
+    hourly_s, reports = now_s + _FIRST_HOURLY_S, ReportRounds()
     return [
+        Periodic("reports", _REPORTS_S, lambda: reports.run(context), now_s),
         # Before retention, so that the hours that an arrival model is learned of are counted whole.
         Periodic("rhythms", HOUR_S, lambda: run_arrival_models(context), hourly_s, steps=True),
         Periodic("retention", HOUR_S, lambda: run_retention(context), hourly_s, steps=True),

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 
 from service.alerts.alerts import end_empty_groups
 from service.alerts.data_gaps import watch_data_gap
+from service.alerts.escalation import escalate
 from service.alerts.silence import end_silences
 from service.alerts.staleness import StaleWatch
 from service.cameras.maintenance import note_ends
@@ -94,6 +95,7 @@ def _reconcile(context: JobContext, camera_id: str, session: Session) -> list[st
 
 def _reconcile_alerts(context: JobContext, stale: StaleWatch, session: Session) -> dict[str, str]:
     reconcile_alerts(session)
+    escalate(session, context.settings)
     return stale.watch(session, context.settings)
 
 

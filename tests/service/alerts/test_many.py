@@ -107,7 +107,10 @@ def test_a_browser_gets_a_page_that_says_the_same(knocked):
     """`/alerts` and `/wall` gave it JSON."""
     asked = knocked.get("/alerts?kind=clock", headers=HTML, follow_redirects=False)
     assert (asked.status_code, asked.headers["location"]) == (303, "/ui/alerts?kind=clock")
-    page = knocked.get("/wall", headers=HTML).text
+    wall = knocked.get("/wall", headers=HTML)
+    assert wall.url.path == "/ui/wall"
+    assert "<title>(14) Wall" in wall.text
+    page = knocked.get("/ui/alerts").text
     assert "<title>(14) Alerts" in page
     shown = re.findall(r'<li class="alert-row" id="alert-(\w+)"', page)
     assert shown == [alert["id"] for alert in firing(knocked)]

@@ -93,7 +93,7 @@ def test_a_silenced_alert_that_grows_stays_silenced_and_says_so(drifting):
     event = drifting.events("alert")[-1]
     assert (event["severity"], event["silenced_by"]) == ("critical", "Ada")
     last = body["acts"][-1]
-    assert (last["act"], last["by"]) == ("escalated", None)
+    assert (last["act"], last["by"]) == ("grew", None)
 
 
 def test_a_silence_that_has_come_to_its_time_is_told_of_once(drifting):

@@ -1,0 +1,1 @@
+"""The weekly report: made, told to webhooks, mailed once."""
