@@ -124,7 +124,7 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
     """
     require_camera(session, camera_id)
     pictures.forget(session, camera_id)
-    if not cameras.remove_snapshot(session, camera_id):
+    if not cameras.remove_image(session, SnapshotRecord, camera_id):
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
     note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
 

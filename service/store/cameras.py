@@ -1,4 +1,4 @@
-"""Cameras, their prior poses, arrival models and still images."""
+"""Cameras, their prior poses, arrival models, still images and plans."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields
@@ -418,7 +418,32 @@ def waiting_snapshot(session: Session, camera_id: str) -> SnapshotRecord | None:
     return session.scalars(found).first()
 
 
-def remove_snapshot(session: Session, camera_id: str) -> bool:
-    """Delete the still image of a camera; False if there was none."""
-    found = delete(SnapshotRecord).where(SnapshotRecord.camera_id == camera_id)
+class PlanRecord(Record):
+    """A plan of the ground that a camera sees, from above, a JPEG: an aerial picture, a floor plan.
+
+    `north_rad` is the direction of north on it, clockwise from up.
+    """
+
+    __tablename__ = "plans"
+
+    camera_id: Mapped[str] = mapped_column(
+        ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
+    )
+    jpeg: Mapped[bytes] = mapped_column(LargeBinary)
+    sha256: Mapped[str] = mapped_column(String(64))
+    width: Mapped[int]
+    height: Mapped[int]
+    metres_per_pixel: Mapped[float]
+    north_rad: Mapped[float]
+    stored_at: Mapped[datetime]
+
+
+def plan_facts(session: Session, camera_id: str) -> PlanRecord | None:
+    """The plan of a camera, of which the picture itself is not read."""
+    return session.get(PlanRecord, camera_id, options=(defer(PlanRecord.jpeg),))
+
+
+def remove_image(session: Session, kind: type[SnapshotRecord | PlanRecord], camera_id: str) -> bool:
+    """Delete the still image or the plan of a camera; False if there was none."""
+    found = delete(kind).where(kind.camera_id == camera_id)
     return bool(session.execute(found).rowcount)  # type: ignore[attr-defined]
