@@ -55,7 +55,7 @@ export function drawMarks(place, marks) {
   place.replaceChildren();
   for (const { points, made, label } of marks.filter((mark) => mark.points.length)) {
     const end = points[1] ?? [points[0][0] + 0.1, points[0][1]];
-    shape(place, "polyline", { class: made ? "mark new" : "mark", points: `${points[0]} ${end}` });
+    shape(place, "polyline", { class: `mark ${made ? "new" : ""} ${points[1] ? "" : "spot"}`, points: `${points[0]} ${end}` });
     if (!label) continue;
     const [x, y] = points[0];
     const size = place.ownerSVGElement.viewBox.baseVal.width / 40;

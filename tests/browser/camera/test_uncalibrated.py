@@ -205,10 +205,11 @@ def test_places_pointed_at_in_picture_and_plan_tell_where_it_stands(planned, ser
         page.get_by_role("button", name="Add the mark").click()
         expect(page.locator("#hint-list li")).to_have_count(number)
     expect(page.locator("#site-plan .mark")).to_have_count(3)
+    expect(page.locator("[data-part=proposed]")).to_contain_text("Pan")
     shoot(page, "plan")
     after = server.http.get("/cameras/corner/hints").json()
     assert after["proposed"]["sd"]["height_m"] < before["height_m"] / 2
-    assert "heading_deg" not in before
+    assert before["heading_deg"] is None
     pose = after["proposed"]["pose"]
     assert (pose["x_m"], pose["y_m"]) == pytest.approx(AT, abs=0.7)
     assert pose["heading_deg"] == pytest.approx(40, abs=2)
