@@ -2,20 +2,19 @@
 
 import math
 from datetime import datetime
-from typing import Annotated, Self
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Response
-from pydantic import BaseModel
 
 from service.api.middleware.dependencies import CallerDep, ReadDep, StateDep, WriteDep
+from service.api.schemas import Out
 from service.api.snapshots import IMAGE_ANSWER, IMAGE_BODY, jpeg_answer, read_body
 from service.cameras import plans
 from service.formats.still import Still
 from service.store.access import set_actor
-from service.store.cameras import PlanRecord
 
 
-class PlanOut(BaseModel):
+class PlanOut(Out):
     """What is known of a plan as it is kept.
 
     Of its pixel (p, q), integers at centres: metres right of its lower left corner are
@@ -29,18 +28,6 @@ class PlanOut(BaseModel):
     metres_per_pixel: float
     north_deg: float
     stored_at: datetime
-
-    @classmethod
-    def from_value(cls, record: PlanRecord) -> Self:
-        """The body of a plan."""
-        return cls(
-            sha256=record.sha256,
-            width=record.width,
-            height=record.height,
-            metres_per_pixel=record.metres_per_pixel,
-            north_deg=math.degrees(record.north_rad),
-            stored_at=record.stored_at,
-        )
 
 
 router = APIRouter(prefix="/cameras/{camera_id}/plan", tags=["cameras"])
@@ -69,7 +56,7 @@ def put(
         record = plans.put_plan(
             session, state.settings, camera_id, still, metres_per_pixel, north_deg
         )
-        return PlanOut.from_value(record)
+        return PlanOut.of(record, north_deg=math.degrees(record.north_rad))
 
 
 @router.get("", response_class=Response, responses=IMAGE_ANSWER)

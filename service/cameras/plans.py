@@ -85,13 +85,6 @@ def remove_plan(session: Session, camera_id: str) -> None:
     note(session, Activity.PLAN_REMOVED, by=None, camera_id=camera_id)
 
 
-def plan_facts(session: Session, settings: Settings, camera_id: str) -> PlanRecord | None:
-    """Size and scale of a camera's plan, without reading it; None where none may be shown."""
-    if settings.snapshots != "pictures":
-        return None
-    return cameras.plan_facts(session, camera_id)
-
-
 def _require_pictures(settings: Settings) -> None:
     if settings.snapshots != "pictures":
         raise SwitchedOffError(

@@ -18,9 +18,8 @@ from service.alerts.data_gaps import DataGap, data_gap_of
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.cameras.cameras import CameraView, view_camera
-from service.cameras.plans import plan_facts
 from service.cameras.poses import PoseView, view_pose
-from service.cameras.snapshots import snapshot_facts, stood_at
+from service.cameras.snapshots import image_facts, stood_at
 from service.cameras.sources import SourceView, rival_sources
 from service.cameras.undo import UNDO_WITHIN, last_answer
 from service.cameras.zones import ZonesView, view_zones
@@ -186,9 +185,9 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
         activity=tuple(journal.newest_activity(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
-        snapshot=snapshot_facts(session, settings, camera_id),
+        snapshot=image_facts(session, settings, SnapshotRecord, camera_id),
         stood_at=stood_at(session, settings, camera_id),
-        plan=plan_facts(session, settings, camera_id),
+        plan=image_facts(session, settings, PlanRecord, camera_id),
         zones=view_zones(session, camera_id),
         snapshots_allowed=settings.snapshots == "pictures",
         newest_event_id=newest_event_id,
