@@ -271,6 +271,8 @@ class Activity(StrEnum):
     TRAINING_CANCELLED = "training.cancelled"
     SNAPSHOT_KEPT = "snapshot.kept"
     SNAPSHOT_REMOVED = "snapshot.removed"
+    PLAN_KEPT = "plan.kept"
+    PLAN_REMOVED = "plan.removed"
     ZONES_DRAWN = "zones.drawn"
     WEBHOOK_ADDED = "webhook.added"
     WEBHOOK_CHANGED = "webhook.changed"

@@ -64,6 +64,7 @@ CALLED = {
     "camera_rhythms": {"profile": None, "counts": '{"tracks": {}, "latest_s": {}}'},
     "access_tokens": {"id": "some"},
     "snapshots": {"jpeg": b"a picture", "sha256": "0" * 64, "width": 1280, "height": 720},
+    "plans": {"jpeg": b"a plan", "sha256": "0" * 64, "metres_per_pixel": 0.1, "north_rad": 0.0},
     "pictures": {"digest": "0" * 64, "turn": "[0, 0, 0]",
                  "covariance": str([[1e-6 * (i == k) for k in range(3)] for i in range(3)])},
     "picture_references": {"features": b"features"},

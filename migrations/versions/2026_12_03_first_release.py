@@ -32,9 +32,9 @@ ACTIVITY = (
     "alert.silenced alert.silence_ended alert.resolved alert.reopened maintenance.planned "
     "maintenance.changed maintenance.ended maintenance.withdrawn maintenance.over "
     "training.requested training.succeeded training.failed training.cancelled snapshot.kept "
-    "snapshot.removed zones.drawn webhook.added webhook.changed webhook.secret_changed "
-    "webhook.removed webhook.tested webhook.replayed token.added token.revoked session.began "
-    "session.ended login.refused settings.changed"
+    "snapshot.removed plan.kept plan.removed zones.drawn webhook.added webhook.changed "
+    "webhook.secret_changed webhook.removed webhook.tested webhook.replayed token.added "
+    "token.revoked session.began session.ended login.refused settings.changed"
 )
 
 
@@ -139,6 +139,15 @@ table(
     *needed(NUMBER, "width", "height"),
     *needed(DateTime, "taken_at", "stored_at"),
     *optional(DateTime, "compared_at"),
+)
+table(
+    "plans",
+    key("camera_id", String(64), of("cameras.id")),
+    *needed(LargeBinary, "jpeg"),
+    *needed(String(64), "sha256"),
+    *needed(NUMBER, "width", "height"),
+    *needed(Double, "metres_per_pixel", "north_rad"),
+    *needed(DateTime, "stored_at"),
 )
 table(
     "picture_references",

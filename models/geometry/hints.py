@@ -21,7 +21,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, norm, rotation_from_angles
 
 _NOISE_PX = 3.0  # of a mark, at a width of 1920
-_LEAN_RAD, _TAPE_LOG, _MAP_M = math.radians(0.3), 0.01, 0.1  # of walls and posts, tapes, maps
+_LEAN_RAD, _TAPE_LOG = math.radians(0.3), 0.01  # of walls and posts, tapes
 _ROUNDS, _CONVERGED, _STEP, _LONGEST = 30, 1e-7, 1e-5, 0.3
 _MOST_TILT_RAD = math.radians(89)
 _LOWEST = 1e-3  # sine of an angle below the horizon
@@ -44,13 +44,14 @@ class Hint:
 
     `points` (N, 2) are pixels: two on the horizon; foot and top of a vertical; both ends of a
     length on the ground; one point of a map. `length_m` is of the length, or of a vertical where it
-    is known; `place_m` x and y on the map.
+    is known; `place_m` x and y on the map, each known to `place_sd_m`.
     """
 
     kind: HintKind
     points: Array
     length_m: float | None = None
     place_m: tuple[float, float] | None = None
+    place_sd_m: float = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +147,7 @@ def _other_sd(hint: Hint) -> float:
     """What marks of a kind are off by beside their pixels."""
     return {
         HintKind.HORIZON: 1e-4, HintKind.VERTICAL: _LEAN_RAD,
-        HintKind.LENGTH: _TAPE_LOG, HintKind.MAP_POINT: _MAP_M,
+        HintKind.LENGTH: _TAPE_LOG, HintKind.MAP_POINT: hint.place_sd_m,
     }[hint.kind]  # fmt: skip
 
 

@@ -24,7 +24,7 @@ class HintBody(RequestBody):
     """A mark in pixels.
 
     Two points of the horizon; foot and top of a vertical, which may have a `length_m`; both ends of
-    a `length_m` on the ground; a point whose `x_m`, `y_m` a map tells.
+    a `length_m` on the ground; a point whose `x_m`, `y_m` a map tells, each to `sd_m` (0.1).
     """
 
     kind: HintKind
@@ -34,6 +34,7 @@ class HintBody(RequestBody):
     length_m: Annotated[Finite, Field(gt=0.01, le=1000)] | None = None
     x_m: _Metres | None = None
     y_m: _Metres | None = None
+    sd_m: Annotated[Finite, Field(ge=0.01, le=100)] | None = None
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
@@ -45,6 +46,8 @@ class HintBody(RequestBody):
         mapped = self.kind == HintKind.MAP_POINT
         if mapped != (self.x_m is not None) or mapped != (self.y_m is not None):
             raise ValueError("x_m, y_m: a map point needs both, nothing else takes them")
+        if self.sd_m is not None and not mapped:
+            raise ValueError("sd_m: a map point alone takes one")
         if self.kind == HintKind.LENGTH and self.length_m is None:
             raise ValueError("length_m: is needed")
         if self.length_m is not None and self.kind in (HintKind.HORIZON, HintKind.MAP_POINT):
@@ -54,8 +57,9 @@ class HintBody(RequestBody):
     def kept(self) -> dict[str, Any]:
         """The mark as it is stored."""
         place = {} if self.x_m is None else {"place_m": [self.x_m, self.y_m]}
+        sure = {} if self.sd_m is None else {"place_sd_m": self.sd_m}
         length = {} if self.length_m is None else {"length_m": self.length_m}
-        return {"kind": self.kind, "points": self.points, **length, **place}
+        return {"kind": self.kind, "points": self.points, **length, **place, **sure}
 
 
 class HintOut(BaseModel):
@@ -66,6 +70,7 @@ class HintOut(BaseModel):
     length_m: float | None
     x_m: float | None
     y_m: float | None
+    sd_m: float | None
     off_sd: float | None
 
 
@@ -86,7 +91,8 @@ class HintsOut(BaseModel):
             items.append(
                 HintOut(
                     kind=kept["kind"], points=kept["points"], length_m=kept.get("length_m"),
-                    x_m=x_m, y_m=y_m, off_sd=None if off is None else off[number],
+                    x_m=x_m, y_m=y_m, sd_m=kept.get("place_sd_m"),
+                    off_sd=None if off is None else off[number],
                 )
             )  # fmt: skip
         return cls(

@@ -91,6 +91,7 @@ def hint_of(kept: dict[str, Any]) -> Hint:
         points=np.array(kept["points"], dtype=np.float64),
         length_m=kept.get("length_m"),
         place_m=None if place is None else (place[0], place[1]),
+        **({"place_sd_m": kept["place_sd_m"]} if "place_sd_m" in kept else {}),
     )
 
 

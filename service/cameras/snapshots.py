@@ -21,7 +21,7 @@ from service.job_queue import JobQueue
 from service.notifications.outbox import json_time
 from service.settings import Settings
 from service.store import cameras, pictures
-from service.store.cameras import SnapshotRecord
+from service.store.cameras import Image, SnapshotRecord
 from service.store.pictures import PictureRecord
 
 _OTHER_SHAPE = 0.01  # of the ratio of its sides
@@ -124,16 +124,18 @@ def remove_snapshot(session: Session, camera_id: str) -> None:
     """
     require_camera(session, camera_id)
     pictures.forget(session, camera_id)
-    if not cameras.remove_snapshot(session, camera_id):
+    if not cameras.remove_image(session, SnapshotRecord, camera_id):
         raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
     note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
 
 
-def snapshot_facts(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord | None:
-    """Size and time of a camera's still image, without reading it; None where none may be shown."""
+def image_facts(
+    session: Session, settings: Settings, kind: type[Image], camera_id: str
+) -> Image | None:
+    """A camera's still image or plan, without reading it; None where none may be shown."""
     if settings.snapshots != "pictures":
         return None
-    return cameras.snapshot_facts(session, camera_id)
+    return cameras.image_facts(session, kind, camera_id)
 
 
 def stood_at(session: Session, settings: Settings, camera_id: str) -> datetime | None:
@@ -146,7 +148,7 @@ def stood_at(session: Session, settings: Settings, camera_id: str) -> datetime |
 
 def newest_at(session: Session, camera_id: str) -> datetime | None:
     """The time of a camera's newest picture, kept or compared; None where there is none."""
-    kept = cameras.snapshot_facts(session, camera_id)
+    kept = cameras.image_facts(session, SnapshotRecord, camera_id)
     compared = session.get(PictureRecord, camera_id)
     times = [each.taken_at for each in (kept, compared) if each is not None]
     return max(times, default=None)

@@ -180,7 +180,7 @@ def save_picture(
     Where features alone are kept, the picture goes.
     """
     camera_id = new.snapshot.camera_id
-    snapshot = cameras.snapshot_facts(session, camera_id)
+    snapshot = cameras.image_facts(session, SnapshotRecord, camera_id)
     newer = snapshot is None or snapshot.sha256 != new.snapshot.sha256
     if newer or cameras.prior_pose(session, camera_id).id != new.prior_pose_id:
         return False

@@ -12,11 +12,12 @@ _READER = "service.formats.still_reader"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Still:
-    """A still image as it is kept: a JPEG of a size."""
+    """A still image as it is kept: a JPEG of a size. `sent_width` is that of what came, upright."""
 
     jpeg: bytes
     width: int
     height: int
+    sent_width: int
 
 
 def read_still(body: bytes, media_type: str) -> Still:
@@ -41,4 +42,4 @@ def read_still(body: bytes, media_type: str) -> Still:
         raise TooLargeError(f"body: at most {said['most']} pixels are taken, got {said['pixels']}")
     if "refused" in said:
         raise MalformedError(f"body: {said['refused']}")
-    return Still(jpeg=jpeg, width=said["width"], height=said["height"])
+    return Still(jpeg=jpeg, **said)

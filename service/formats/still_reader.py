@@ -20,7 +20,7 @@ _QUALITY = 82
 
 
 def main() -> None:
-    """Answer for the image on stdin: `{"width", "height"}`, or `{"refused": why}`."""
+    """Answer for the image on stdin: `{"width", "height", "sent_width"}`, or `{"refused": why}`."""
     cpu_s, form = int(sys.argv[1]), sys.argv[2]
     body = sys.stdin.buffer.read()
     _load_all()
@@ -57,10 +57,12 @@ def _read(body: bytes, form: str) -> tuple[dict[str, str | int], bytes]:
         return {"refused": f"not a whole {form} image: {error}"}, b""
     except MemoryError:
         return {"refused": f"not a whole {form} image: reading it takes too much memory"}, b""
+    sent_width = image.width
     image.thumbnail((_LONGEST_SIDE, _LONGEST_SIDE))
     made = BytesIO()
     image.save(made, "JPEG", quality=_QUALITY, exif=b"", icc_profile=None, comment=b"")
-    return {"width": image.width, "height": image.height}, made.getvalue()
+    sizes = {"width": image.width, "height": image.height, "sent_width": sent_width}
+    return dict(sizes), made.getvalue()
 
 
 if __name__ == "__main__":

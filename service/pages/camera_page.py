@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
@@ -19,10 +19,11 @@ from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.cameras.cameras import CameraView, view_camera
 from service.cameras.poses import PoseView, view_pose
-from service.cameras.snapshots import snapshot_facts, stood_at
+from service.cameras.snapshots import image_facts, stood_at
 from service.cameras.sources import SourceView, rival_sources
 from service.cameras.undo import UNDO_WITHIN, last_answer
 from service.cameras.zones import ZonesView, view_zones
+from service.degrees import in_degrees
 from service.enums import AlertState, PoseState, TokenScope
 from service.formats.zone_formats import ZoneFormat
 from service.pages.camera_charts import RANGES, History, draw_charts, load_history, table_rows
@@ -31,7 +32,7 @@ from service.pages.connecting import how_to_connect
 from service.settings import Settings
 from service.store import cameras, journal, references, tracks, trainings
 from service.store.alerts import AlertFilter, AlertRecord
-from service.store.cameras import PriorPoseRecord, SnapshotRecord
+from service.store.cameras import PlanRecord, PriorPoseRecord, SnapshotRecord
 from service.store.journal import ActivityRecord
 from service.store.references import MaintenanceRecord
 from service.store.tracks import StoredTrack, trajectory_of
@@ -85,6 +86,7 @@ class CameraPage:
     sources: tuple[SourceView, ...]
     snapshot: SnapshotRecord | None
     stood_at: datetime | None
+    plan: PlanRecord | None
     zones: ZonesView
     snapshots_allowed: bool
     newest_event_id: int
@@ -183,8 +185,9 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
         activity=tuple(journal.newest_activity(session, camera_id, _ACTIVITY)),
         sources=rival_sources(session, settings, camera_id),
-        snapshot=snapshot_facts(session, settings, camera_id),
+        snapshot=image_facts(session, settings, SnapshotRecord, camera_id),
         stood_at=stood_at(session, settings, camera_id),
+        plan=image_facts(session, settings, PlanRecord, camera_id),
         zones=view_zones(session, camera_id),
         snapshots_allowed=settings.snapshots == "pictures",
         newest_event_id=newest_event_id,
@@ -254,6 +257,7 @@ def show(
         connect=None if learned.ready else how_to_connect(request, state.settings, camera_id),
         operates=operates,
         administers=caller is None or caller.may(TokenScope.ADMIN),
+        plan=_plan(page.plan),
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,
@@ -332,6 +336,12 @@ def _zone_rows(view: ZonesView, counts: Mapping[str, str]) -> list[ZoneRow]:
             }
         rows.append(ZoneRow(name=each.zone.id, overlap=each.now.overlap, **said))
     return rows
+
+
+def _plan(record: PlanRecord | None) -> dict[str, Any] | None:
+    """A plan as the API has it, for the script that shows it."""
+    names = ("sha256", "width", "height", "metres_per_pixel", "north_rad")
+    return None if record is None else in_degrees({name: getattr(record, name) for name in names})
 
 
 def _frigate(settings: Settings, zones: ZonesView) -> str | None:

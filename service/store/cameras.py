@@ -1,9 +1,9 @@
-"""Cameras, their prior poses, arrival models and still images."""
+"""Cameras, their prior poses, arrival models, still images and plans."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields
 from datetime import datetime
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import (
     JSON,
@@ -412,10 +412,10 @@ def arrival_profile(session: Session, camera_id: str) -> dict[str, Any] | None:
     return session.scalar(select(RhythmRecord.profile).where(RhythmRecord.camera_id == camera_id))
 
 
-class SnapshotRecord(Record):
-    """A still image of a camera, a JPEG, in a row of its own: no other query reads it."""
+class ImageRecord(Record):
+    """An image of a camera, a JPEG, in a row of its own: no other query reads it."""
 
-    __tablename__ = "snapshots"
+    __abstract__ = True
 
     camera_id: Mapped[str] = mapped_column(
         ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
@@ -424,14 +424,36 @@ class SnapshotRecord(Record):
     sha256: Mapped[str] = mapped_column(String(64))
     width: Mapped[int]
     height: Mapped[int]
-    taken_at: Mapped[datetime]
     stored_at: Mapped[datetime]
+
+
+class SnapshotRecord(ImageRecord):
+    """A still image of what a camera sees."""
+
+    __tablename__ = "snapshots"
+
+    taken_at: Mapped[datetime]
     compared_at: Mapped[datetime | None]
 
 
-def snapshot_facts(session: Session, camera_id: str) -> SnapshotRecord | None:
-    """The still image of a camera, of which the picture itself is not read."""
-    return session.get(SnapshotRecord, camera_id, options=(defer(SnapshotRecord.jpeg),))
+class PlanRecord(ImageRecord):
+    """A plan of the ground that a camera sees, from above: an aerial picture or a floor plan.
+
+    `north_rad` is the direction of north on it, clockwise from up.
+    """
+
+    __tablename__ = "plans"
+
+    metres_per_pixel: Mapped[float]
+    north_rad: Mapped[float]
+
+
+Image = TypeVar("Image", bound=ImageRecord)
+
+
+def image_facts(session: Session, kind: type[Image], camera_id: str) -> Image | None:
+    """The still image or the plan of a camera, of which the picture itself is not read."""
+    return session.get(kind, camera_id, options=(defer(kind.jpeg),))
 
 
 def waiting_snapshot(session: Session, camera_id: str) -> SnapshotRecord | None:
@@ -441,7 +463,7 @@ def waiting_snapshot(session: Session, camera_id: str) -> SnapshotRecord | None:
     return session.scalars(found).first()
 
 
-def remove_snapshot(session: Session, camera_id: str) -> bool:
-    """Delete the still image of a camera; False if there was none."""
-    found = delete(SnapshotRecord).where(SnapshotRecord.camera_id == camera_id)
+def remove_image(session: Session, kind: type[ImageRecord], camera_id: str) -> bool:
+    """Delete the still image or the plan of a camera; False if there was none."""
+    found = delete(kind).where(kind.camera_id == camera_id)
     return bool(session.execute(found).rowcount)  # type: ignore[attr-defined]

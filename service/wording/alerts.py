@@ -122,6 +122,8 @@ _DONE = {
     Activity.TRAINING_REQUESTED: "asked for a training",
     Activity.SNAPSHOT_KEPT: "put a new still image",
     Activity.SNAPSHOT_REMOVED: "deleted the still image",
+    Activity.PLAN_KEPT: "put a plan of the site",
+    Activity.PLAN_REMOVED: "deleted the plan of the site",
     Activity.ZONES_DRAWN: "drew the zones anew",
 }
 _HAPPENED = {

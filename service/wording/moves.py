@@ -76,15 +76,18 @@ def moved_words(estimate: EstimateRecord, since: str = "") -> str:
 
 
 def proposed_rows(pose: CameraPose, sd: Mapping[str, float]) -> list[tuple[str, str, str]]:
-    """Name, value and half the 90 % interval of each number of a proposed pose."""
+    """Name, value and half the 90 % interval of each number of a proposed pose; pan by a map."""
+    angles = {"Tilt": "tilt_rad", "Roll": "roll_rad", "Pan": "heading_rad"}
     return [
         ("Height", f"{pose.height_m:.1f} m", f"±{Z90 * sd['height_m']:.1f} m"),
         *(
-            (name, f"{math.degrees(value):.1f}°", f"±{math.degrees(Z90 * sd_rad):.1f}°")
-            for name, value, sd_rad in (
-                ("Tilt", pose.tilt_rad, sd["tilt_rad"]),
-                ("Roll", pose.roll_rad, sd["roll_rad"]),
+            (
+                name,
+                f"{math.degrees(getattr(pose, field)):.1f}°",
+                f"±{math.degrees(Z90 * sd[field]):.1f}°",
             )
+            for name, field in angles.items()
+            if field in sd
         ),
     ]
 

@@ -89,6 +89,15 @@ def axe(page: Any) -> list[str]:
     ]
 
 
+def finger(page: Any, *points: tuple[float, float]) -> None:
+    """Press a finger on a page's screen, drag it from point to point, and lift it."""
+    devtools = page.context.new_cdp_session(page)
+    for number, (x, y) in enumerate(points):
+        kind = "touchMove" if number else "touchStart"
+        devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y}]})
+    devtools.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+
 def too_wide(page: Any) -> int:
     """By how many pixels a page is wider than its window."""
     wide: int = page.evaluate(

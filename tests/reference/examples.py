@@ -327,6 +327,11 @@ def _others(run: _Run) -> None:
     headers = {"Content-Type": "image/png"}
     kept = run.http.put(snapshot, content=still.getvalue(), headers=headers)
     run.schemas["SnapshotOut"] = run.settled(kept.json())
+    scale = {"metres_per_pixel": 0.1, "north_deg": 12}
+    kept = run.http.put(
+        "/cameras/corner/plan", content=still.getvalue(), headers=headers, params=scale
+    )
+    run.schemas["PlanOut"] = run.settled(kept.json())
     run.ask("POST", "/cameras/{camera_id}/aim", camera_id="corner")
     hook = {"url": "https://203.0.113.7/surefoot", "name": "on call", "kinds": ["drift"]}
     made = run.ask("POST", "/webhooks", hook)

@@ -129,7 +129,7 @@ async def start_threads(number: int) -> None:
 
 _MB = 1024 * 1024
 _TRACKS = re.compile(r"(/cameras/[^/]+/tracks|/ui/tracks)")
-_SNAPSHOT = re.compile(r"/cameras/[^/]+/(snapshot|aim)")
+_IMAGE = re.compile(r"/cameras/[^/]+/(snapshot|aim|plan)")
 
 
 class AdmissionMiddleware:
@@ -198,7 +198,7 @@ class AdmissionMiddleware:
     def _limit_mb(self, path: str) -> float:
         if _TRACKS.fullmatch(path):
             return self._settings.max_tracks_body_mb
-        if _SNAPSHOT.fullmatch(path):
+        if _IMAGE.fullmatch(path):
             return self._settings.max_snapshot_mb
         return self._settings.max_body_mb
 

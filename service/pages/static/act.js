@@ -31,6 +31,15 @@ export async function call(method, url, body, headers = {}) {
   throw new Refused(document ?? { title: `Error ${answer.status}`, detail: answer.statusText });
 }
 
+/** The answer to a file that is sent; it throws as `call` does. */
+export async function sendFile(url, file) {
+  const headers = { "Content-Type": file.type, Accept: "application/json" };
+  const answer = await fetch(url, { method: "PUT", body: file, headers });
+  const document = await answer.json();
+  if (!answer.ok) throw new Refused(document);
+  return document;
+}
+
 // What a person can do about an answer that programs read.
 const PLAIN = {
   401: "You are not logged in any more. Log in again, in another tab if you have typed much.",

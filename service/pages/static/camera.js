@@ -1,6 +1,6 @@
 // The page of a camera: what happens is fetched and exchanged part by part; actions are calls.
 
-import { Refused, announce, call, confirmed, guarded } from "./act.js";
+import { announce, call, confirmed, guarded, sendFile } from "./act.js";
 import { ALERT_ACTS, done, listen, planMaintenance } from "./alert_acts.js";
 import { myName, nameMe, signed } from "./dialogs.js";
 import { debounced, subscribe } from "./events.js";
@@ -32,7 +32,6 @@ async function refresh() {
     exchange(part, news);
   }
   showName();
-  document.dispatchEvent(new CustomEvent("camera-news"));
 }
 
 function exchange(part, news) {
@@ -163,10 +162,7 @@ root.addEventListener("input", ({ target }) => {
 });
 
 async function sendStill(file) {
-  const answer = await fetch(`${path}/snapshot`, {
-    method: "PUT", body: file, headers: { "Content-Type": file.type },
-  });
-  if (!answer.ok) throw new Refused(await answer.json());
+  await sendFile(`${path}/snapshot`, file);
   announce("The still image is kept.");
   await refresh();
 }

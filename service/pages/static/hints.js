@@ -2,6 +2,7 @@
 
 import { announce, call, guarded, Refused } from "./act.js";
 import { refreshSoon } from "./camera.js";
+import { drags, drawMarks } from "./pointing.js";
 
 const form = document.getElementById("hint");
 const list = document.getElementById("hint-list");
@@ -10,59 +11,40 @@ const camera = document.getElementById("camera").dataset.camera;
 const url = `/cameras/${encodeURIComponent(camera)}/hints`;
 const NAMES = { vertical: "Vertical", length: "Length", horizon: "Horizon", map_point: "Map point" };
 const LIES = 3; // standard deviations, from which on a mark is doubted
-const NEAR_PX = 3; // of the screen: a tap, and no line
+const over = document.getElementById("over");
+const place = document.getElementById("over-marks");
 
 let kept = [];
 
 // --- Drawing -----------------------------------------------------------------------------------
 
-const picture = () => document.querySelector('[data-part="picture"] svg.picture');
-
-/** The pixel of the camera's picture that an event is at. */
-function pixel(event, svg) {
-  const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-  return [at.x, at.y].map((value) => Math.round(value * 10) / 10);
-}
-
 const typed = ([u, v]) => `${u} ${v}`;
 const numbers = (text) => text.split(/[\s,;]+/).filter(Boolean).map(Number);
+const metres = (text) => Number(text.replace(",", "."));
+const isOne = () => form.elements.kind.value === "map_point";
 
-let begun = null;
-
-function down(event) {
-  const svg = event.target.closest?.("svg.picture");
-  if (!svg || svg !== picture() || event.button > 0) return;
-  event.preventDefault(); // a finger draws, and does not scroll
-  begun = { svg, at: [event.clientX, event.clientY] };
-  svg.setPointerCapture(event.pointerId);
-  form.elements.from.value = typed(pixel(event, svg));
+function press(at) {
+  if (over.closest(".zoning")) return false;
+  form.elements.from.value = typed(at);
   form.elements.to.value = "";
   show();
 }
 
-function move(event) {
-  if (!begun) return;
-  const far = Math.hypot(event.clientX - begun.at[0], event.clientY - begun.at[1]);
-  if (far < NEAR_PX || form.elements.kind.value === "map_point") return;
-  form.elements.to.value = typed(pixel(event, begun.svg));
+function drag(at) {
+  form.elements[isOne() ? "from" : "to"].value = typed(at);
   show();
 }
 
-/** Draw the marks, and the one that is being made. */
+/** Draw the marks, and the one that is being made; those of a map on its plan, too. */
 function show() {
-  const svg = picture();
-  if (!svg) return;
-  for (const old of svg.querySelectorAll(".mark")) old.remove();
-  const made = ["from", "to"].map((name) => numbers(form.elements[name].value)).filter((at) => at.length === 2);
-  for (const points of [...kept.map((mark) => mark.points), made]) {
-    if (!points.length) continue;
-    const line = document.createElementNS(svg.namespaceURI, "polyline");
-    line.setAttribute("class", points === made ? "mark new" : "mark");
-    const end = points[1] ?? [points[0][0] + 0.1, points[0][1]];
-    line.setAttribute("points", [points[0], end].map((at) => at.join(",")).join(" "));
-    svg.append(line);
-  }
+  const { from, to, x_m, y_m } = form.elements;
+  const made = [from, to].map(({ value }) => numbers(value)).filter((at) => at.length === 2);
+  drawMarks(place, [...kept.map(({ points }, n) => ({ points, label: label(n) })), { points: made, made: true }]);
+  const spot = x_m.value && y_m.value ? [x_m, y_m].map(({ value }) => metres(value)) : null;
+  document.dispatchEvent(new CustomEvent("marks", { detail: { kept, label, spot } }));
 }
+
+const label = (n) => (kept[n].kind === "map_point" ? `${n + 1}` : "");
 
 // --- Keeping -----------------------------------------------------------------------------------
 
@@ -71,7 +53,7 @@ function row(mark, number) {
   const words = document.createElement("span");
   const size = mark.length_m ? ` of ${mark.length_m} m` : "";
   const lies = mark.off_sd > LIES ? ": it does not fit the others" : "";
-  words.textContent = `${NAMES[mark.kind]}${size}${lies}`;
+  words.textContent = `${NAMES[mark.kind]} ${label(number)}`.trim() + size + lies;
   const button = document.createElement("button");
   button.type = "button";
   button.className = "slim";
@@ -100,10 +82,10 @@ async function keep(marks) {
 async function add() {
   says.textContent = "";
   const fields = Object.fromEntries(new FormData(form));
-  const one = fields.kind === "map_point";
+  const one = isOne();
   const mark = { kind: fields.kind, points: (one ? [fields.from] : [fields.from, fields.to]).map(numbers) };
-  for (const name of one ? ["x_m", "y_m"] : ["length_m"])
-    if (fields[name]?.trim() && fields.kind !== "horizon") mark[name] = Number(fields[name].replace(",", "."));
+  for (const name of one ? ["x_m", "y_m", "sd_m"] : ["length_m"])
+    if (fields[name]?.trim() && fields.kind !== "horizon") mark[name] = metres(fields[name]);
   try {
     await keep([...kept, mark]);
   } catch (error) {
@@ -111,25 +93,29 @@ async function add() {
     says.textContent = error.problem.errors?.[0]?.reason ?? error.message;
     return; // what was typed stays
   }
-  for (const name of ["from", "to", "length_m", "x_m", "y_m"]) form.elements[name].value = "";
+  for (const name of ["from", "to", "length_m", "x_m", "y_m", "sd_m"]) form.elements[name].value = "";
   show();
   form.elements.from.focus();
 }
 
 function choose() {
-  for (const place of form.querySelectorAll("[data-for]"))
-    place.hidden = !place.dataset.for.split(" ").includes(form.elements.kind.value);
+  for (const part of document.querySelectorAll("#hints [data-for]"))
+    part.hidden = !part.dataset.for.split(" ").includes(form.elements.kind.value);
 }
 
-document.addEventListener("pointerdown", down);
-document.addEventListener("pointermove", move);
-document.addEventListener("pointerup", () => (begun = null));
-document.addEventListener("camera-news", show);
+drags(over, press, drag);
+document.addEventListener("plan-place", ({ detail }) => {
+  for (const [name, value] of Object.entries(detail)) form.elements[name].value = value;
+  show();
+});
 form.addEventListener("submit", (event) => {
   event.preventDefault();
   guarded(form.querySelector("button"), add);
 });
-form.addEventListener("input", show);
+form.addEventListener("input", ({ target }) => {
+  if (["x_m", "y_m"].includes(target.name)) form.elements.sd_m.value = ""; // it is the plan's no more
+  show();
+});
 form.elements.kind.addEventListener("change", choose);
 choose();
 call("GET", url).then(told, console.warn);

@@ -5,14 +5,22 @@ import re
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from service.workers.estimate import run_estimate
 from tests.browser.camera.conftest import URL
-from tests.browser.conftest import axe, shoot, too_wide
+from tests.browser.conftest import axe, finger, shoot, too_wide
 from tests.conftest import CAMERA
+from tests.running import served
 from tests.service.street import LENS, PRIOR, Street
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, migrated):
+    with served(tmp_path_factory.mktemp("camera"), migrated, snapshots="pictures") as running:
+        yield running
 
 
 def people_tell(server):
@@ -128,19 +136,117 @@ def test_a_length_is_typed_by_keyboard_and_a_refusal_keeps_what_was_typed(waitin
 
 
 def test_a_finger_draws_the_horizon(waiting, browser, server, expect):
-    finger = browser.new_context(has_touch=True, base_url=server.url).new_page()
-    finger.goto(URL)
-    finger.select_option("#hint-kind", "horizon")
-    svg = finger.locator("[data-part=picture] svg.picture")
+    phone = browser.new_context(has_touch=True, base_url=server.url).new_page()
+    phone.goto(URL)
+    phone.select_option("#hint-kind", "horizon")
+    svg = phone.locator("[data-part=picture] svg.picture")
     svg.scroll_into_view_if_needed()
     box = svg.bounding_box()
-    devtools = finger.context.new_cdp_session(finger)
-    for kind, share in (("touchStart", 0.2), ("touchMove", 0.5), ("touchMove", 0.8)):
-        at = {"x": box["x"] + share * box["width"], "y": box["y"] + 0.1 * box["height"]}
-        devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [at]})
-    devtools.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    expect(finger.locator("polyline.mark.new")).to_have_count(1)
-    u, v = map(float, finger.locator("#hint-to").input_value().split())
+    shares = ((0.2, 0.1), (0.5, 0.1), (0.8, 0.1))
+    finger(phone, *((box["x"] + u * box["width"], box["y"] + v * box["height"]) for u, v in shares))
+    expect(phone.locator("polyline.mark.new")).to_have_count(1)
+    u, v = map(float, phone.locator("#hint-to").input_value().split())
     assert u == pytest.approx(0.8 * LENS.width, abs=4)
     assert v == pytest.approx(0.1 * LENS.height, abs=4)
-    finger.context.close()
+    phone.context.close()
+
+
+# A plan of 60 x 45 m whose right is north: the camera is 20 m right of and 15 m up from its lower
+# left corner, so 15 m to the west and 20 m to the north of it.
+PLAN_M_PER_PX, AT = 0.05, (-15.0, 20.0)
+
+
+def on_plan(page, forward_m, right_m):
+    """Where a place of the street is on the plan, on the screen."""
+    sine, cosine = math.sin(PRIOR.heading_rad), math.cos(PRIOR.heading_rad)
+    east, north = forward_m * sine + right_m * cosine, forward_m * cosine - right_m * sine
+    svg = page.locator("#site-plan")
+    svg.scroll_into_view_if_needed()
+    box = svg.bounding_box()
+    return (
+        box["x"] + (AT[1] + north) / 60 * box["width"],
+        box["y"] + (45 + AT[0] + east) / 45 * box["height"],
+    )
+
+
+@pytest.fixture
+def planned(waiting, tmp_path, expect):
+    """The page with a plan, measured by a line of 400 pixels that is 20 m long."""
+    Image.linear_gradient("L").resize((1200, 900)).save(tmp_path / "plan.png")
+    waiting.select_option("#hint-kind", "map_point")
+    waiting.set_input_files("#plan-file", tmp_path / "plan.png")
+    expect(waiting.locator("#plan-form")).to_be_visible()
+    box = waiting.locator("#site-plan").bounding_box()
+    waiting.mouse.move(box["x"] + box["width"] / 6, box["y"] + box["height"] / 2)
+    waiting.mouse.down()
+    waiting.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, steps=3)
+    waiting.mouse.up()
+    waiting.fill("#plan-length", "20")
+    assert float(waiting.input_value("#plan-scale")) == pytest.approx(PLAN_M_PER_PX, rel=0.01)
+    shoot(waiting, "plan-measured")
+    waiting.fill("#plan-scale", str(PLAN_M_PER_PX))
+    waiting.fill("#plan-north", "90")
+    waiting.get_by_role("button", name="Keep the plan").click()
+    expect(waiting.locator("#plan-form")).to_be_hidden()
+    return waiting
+
+
+def test_places_pointed_at_in_picture_and_plan_tell_where_it_stands(planned, server, expect):
+    page = planned
+    before = server.http.get("/cameras/corner/hints").json()["proposed"]["sd"]
+    for number, place in enumerate([(12, -3), (14, 5), (18, 1)], start=1):
+        page.mouse.click(*on_screen(page, *place))
+        # A mouse may be dragged to its place.
+        u, v = on_plan(page, *place)
+        page.mouse.move(u - 30, v + 20)
+        page.mouse.down()
+        page.mouse.move(u, v, steps=3)
+        page.mouse.up()
+        page.get_by_role("button", name="Add the mark").click()
+        expect(page.locator("#hint-list li")).to_have_count(number)
+    expect(page.locator("#site-plan .mark")).to_have_count(3)
+    expect(page.locator("[data-part=proposed]")).to_contain_text("Pan")
+    shoot(page, "plan")
+    after = server.http.get("/cameras/corner/hints").json()
+    assert after["proposed"]["sd"]["height_m"] < before["height_m"] / 2
+    assert before["heading_deg"] is None
+    pose = after["proposed"]["pose"]
+    assert (pose["x_m"], pose["y_m"]) == pytest.approx(AT, abs=0.7)
+    assert pose["heading_deg"] == pytest.approx(40, abs=2)
+    assert max(each["off_sd"] for each in after["items"]) < 3
+    assert axe(page) == []
+    assert not too_wide(page)
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert axe(page) == []
+    assert not too_wide(page)
+    shoot(page, "plan-phone")
+    page.reload()
+    page.select_option("#hint-kind", "map_point")
+    expect(page.locator("#site-plan .mark")).to_have_count(3)
+    page.get_by_role("button", name="Delete the plan").click()
+    page.get_by_role("button", name="Delete it", exact=True).click()
+    expect(page.locator("#site-plan")).to_be_hidden()
+    assert server.http.get("/cameras/corner/plan").status_code == 404
+    assert len(server.http.get("/cameras/corner/hints").json()["items"]) == 3
+
+
+def test_a_finger_and_arrows_point_at_the_plan(planned, browser, server, expect):
+    phone = browser.new_context(
+        has_touch=True, base_url=server.url, viewport={"width": 390, "height": 844}
+    ).new_page()
+    phone.goto(URL)
+    phone.select_option("#hint-kind", "map_point")
+    finger(phone, on_screen(phone, 12, -3))
+    u, v = on_plan(phone, 12, -3)
+    finger(phone, (u + 20, v), (u + 10, v), (u, v))
+    sine, cosine = math.sin(PRIOR.heading_rad), math.cos(PRIOR.heading_rad)
+    x_m, y_m = AT[0] + 12 * sine - 3 * cosine, AT[1] + 12 * cosine + 3 * sine
+    assert float(phone.input_value("#hint-x")) == pytest.approx(x_m, abs=0.2)
+    assert float(phone.input_value("#hint-y")) == pytest.approx(y_m, abs=0.2)
+    phone.context.close()
+    # From the middle, 30 m right and 22.5 m up: 6 pixels an arrow, and one with Shift.
+    planned.locator("#site-plan").focus()
+    for press in ("ArrowRight", "ArrowRight", "ArrowUp", "Shift+ArrowLeft"):
+        planned.keyboard.press(press)
+    assert float(planned.input_value("#hint-x")) == pytest.approx(-22.5 - 6 * 0.05, abs=0.03)
+    assert float(planned.input_value("#hint-y")) == pytest.approx(30 + 11 * 0.05, abs=0.03)

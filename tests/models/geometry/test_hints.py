@@ -1,6 +1,7 @@
 """Marks in a picture: what they tell of the pose, made by `cv2.projectPoints`."""
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -80,6 +81,14 @@ def test_two_points_of_a_map_tell_where_it_stands_and_north(lens):
     assert math.degrees(found.heading_rad) == pytest.approx(40.0, abs=0.5)
     assert (found.x_m, found.y_m) == pytest.approx((POSE.x_m, POSE.y_m), abs=0.3)
     assert found.height_m == pytest.approx(POSE.height_m, rel=0.03)
+
+
+def test_a_coarse_map_makes_north_less_sure(lens):
+    """Of two places 10 m apart that are each off by 2 m across: sqrt(2) 2 / 10 rad."""
+    places = [ahead(14, -5), ahead(14, 5)]
+    marks = [replace(mapped(lens, *each), place_sd_m=2.0) for each in places]
+    found = with_hints(plane_parameters_of(POSE), np.diag([1e-8] * 3), marks, lens)
+    assert math.sqrt(found.covariance[3, 3]) == pytest.approx(math.sqrt(2) * 2 / 10, rel=0.01)
 
 
 def test_a_mark_that_lies_is_named(lens):

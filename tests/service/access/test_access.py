@@ -121,6 +121,16 @@ def test_who_may_not_register_is_not_asked_to(closed, made):
     assert "/ui/register" in closed.get("/", headers=made("admin")).text
 
 
+def test_who_may_look_alone_is_not_asked_to_draw(closed, made):
+    bare = {name: value for name, value in CAMERA.items() if name != "prior_pose"}
+    closed.post("/cameras", json=bare, headers=made("admin")).raise_for_status()
+    pages = [
+        closed.get("/ui/cameras/corner", headers=made(scope)).text for scope in ("read", "operate")
+    ]
+    for part in ("draw-zones", "zones.js", 'id="over"', "hints.js"):
+        assert [part in text for text in pages] == [False, True], part
+
+
 def test_a_tracker_posts_for_its_cameras_alone(closed, made):
     admin = made("admin")
     for camera_id in ("corner", "gate"):

@@ -11,6 +11,8 @@ from service.app import create_app
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.bench import Bench, moved
+from tests.service.cameras.test_plans import SCALE
+from tests.service.cameras.test_snapshots import JPEG, image
 
 
 @pytest.fixture
@@ -44,6 +46,8 @@ def test_every_act_is_kept_with_the_person_and_the_token(closed):
         ("POST", "/cameras/corner/reference/reset", {"json": mallory}),
         ("POST", "/cameras/corner/trainings", {"json": mallory}),
         ("DELETE", f"/cameras/corner/maintenance/{window.json()['id']}", {}),
+        ("PUT", "/cameras/corner/plan", {"content": image(), "headers": JPEG, "params": SCALE}),
+        ("DELETE", "/cameras/corner/plan", {}),
         ("PATCH", "/cameras/corner", {"json": {"name": "New"}, "headers": etag}),
         ("PATCH", f"/webhooks/{hook}", {"json": {"name": "other"}}),
         ("POST", f"/webhooks/{hook}/secret", {}),
@@ -62,6 +66,8 @@ def test_every_act_is_kept_with_the_person_and_the_token(closed):
         "training.requested",
         "maintenance.planned",
         "maintenance.ended",
+        "plan.kept",
+        "plan.removed",
         "webhook.added",
         "webhook.changed",
         "webhook.secret_changed",

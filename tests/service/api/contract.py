@@ -211,7 +211,7 @@ class Ground:
                 case.body["tracks"].append(good)
                 if chance % 4:
                     case.query = {}  # a wrong one there is refused before the body is read
-        elif case.path.endswith("/snapshot") and case.method == "PUT" and chance % 2:
+        elif case.path.endswith(("/snapshot", "/plan")) and case.method == "PUT" and chance % 2:
             case.body = self.still.getvalue()
         elif isinstance(case.body, dict):
             good = _GOOD.get(case.path.rsplit("/", 1)[1], {})

@@ -1,0 +1,77 @@
+"""`/cameras/{id}/plan`: an aerial picture or a floor plan, on which map points are shown."""
+
+import math
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Query, Response
+
+from service.api.middleware.dependencies import AddressDep, CallerDep, ReadDep, StateDep, WriteDep
+from service.api.schemas import Out
+from service.api.snapshots import IMAGE_ANSWER, IMAGE_BODY, jpeg_answer, read_body
+from service.cameras import plans
+from service.formats.still import Still
+from service.store.access import set_actor
+
+
+class PlanOut(Out):
+    """What is known of a plan as it is kept.
+
+    Of its pixel (p, q), integers at centres: metres right of its lower left corner are
+    `metres_per_pixel` (p + 0.5), those up from there `metres_per_pixel` (`height` - q - 0.5). x is
+    to the east and y to the north, which is `north_deg` clockwise from up.
+    """
+
+    sha256: str
+    width: int
+    height: int
+    metres_per_pixel: float
+    north_deg: float
+    stored_at: datetime
+
+
+router = APIRouter(prefix="/cameras/{camera_id}/plan", tags=["cameras"])
+
+
+@router.put("", openapi_extra=IMAGE_BODY)
+def put(
+    camera_id: str,
+    still: Annotated[Still, Depends(read_body)],
+    state: StateDep,
+    caller: CallerDep,
+    address: AddressDep,
+    metres_per_pixel: Annotated[
+        float, Query(ge=1e-4, le=100, allow_inf_nan=False, description="of the picture as sent")
+    ],
+    north_deg: Annotated[
+        float,
+        Query(ge=-360, le=360, allow_inf_nan=False, description="of north, clockwise from up"),
+    ] = 0.0,
+) -> PlanOut:
+    """Keep a picture of the ground from above in place of the one there was, at most 1920 px wide.
+
+    It is made anew without EXIF. Map points are shown on it; it goes with its camera.
+    """
+    with state.store.write(camera_id) as session:
+        set_actor(session, caller, address)
+        record = plans.put_plan(
+            session, state.settings, camera_id, still, metres_per_pixel, north_deg
+        )
+        return PlanOut.of(record, north_deg=math.degrees(record.north_rad))
+
+
+@router.get("", response_class=Response, responses=IMAGE_ANSWER)
+def show(
+    camera_id: str,
+    state: StateDep,
+    session: ReadDep,
+    if_none_match: Annotated[str | None, Header()] = None,
+) -> Response:
+    """The plan of a camera."""
+    return jpeg_answer(plans.show_plan(session, state.settings, camera_id), if_none_match)
+
+
+@router.delete("", status_code=204)
+def remove(camera_id: str, session: WriteDep) -> None:
+    """Delete the plan of a camera; marks by it stay."""
+    plans.remove_plan(session, camera_id)
