@@ -86,10 +86,7 @@ def turn_between(reference: Features, now: Features, intrinsics: Intrinsics) -> 
 
     That is no evidence of a move: it may be night, fog, or a lorry before the camera.
 
-    Args:
-        reference: of the picture before.
-        now: of the newer one, of any size.
-        intrinsics: of the camera; scaled to the pictures' sizes.
+    Pictures may be of any size: the lens is scaled to theirs.
     """
     matches = match(reference, now, intrinsics)
     # A clock in the picture stands whatever the camera does.

@@ -46,11 +46,7 @@ def moved_zones(
 ) -> MovedZones | None:
     """The consequence of a pose for zones; None where there are none, or they were drawn at it.
 
-    Args:
-        record: of the zones.
-        lens: of the camera now.
-        pose: that it has now.
-        tracks: of people since it has.
+    `tracks` are of people since the camera has this pose.
     """
     now = View(intrinsics=lens, pose=pose)
     if record is None or not record.zones or record.view == now:

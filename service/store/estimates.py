@@ -159,12 +159,8 @@ def of_drift(
 
     The newest of those whose people had begun to come by then, and if none had, the first.
 
-    Args:
-        session: of a store.
-        camera_id: of the camera.
-        moved_s: when the drift began, in the time of tracks, where that is known.
-        until: when the drift was over; None while it lasts.
-        at_s: the time.
+    The drift began at `moved_s` of the tracks' time, where that is known, and was over at `until`,
+    None while it lasts.
     """
     conditions = [
         EstimateRecord.camera_id == camera_id,

@@ -178,11 +178,8 @@ def train_apart(
 ) -> Trained:
     """Train in a process of its own; what `on_tick` raises ends it.
 
-    Args:
-        plan: what to train.
-        settings: where weights go, threads and limit.
-        on_tick: called twice a second with the newest progress, None before there is any.
-        may_go_on: asked as often; while it says no, the training rests between two of its steps.
+    `on_tick` is called twice a second with the newest progress, None before there is any, and
+    `may_go_on` asked as often; while it says no, the training rests between two of its steps.
 
     Raises:
         CalibrationError: the plan cannot be trained, or what came of it is no good.
