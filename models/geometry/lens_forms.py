@@ -47,10 +47,5 @@ def lens_of(
     assert fisheye is not None
     said = {name: value for name, value in fisheye.items() if value is not None}
     middle = {"cx": (width - 1) / 2, "cy": (height - 1) / 2}
-    whole = {"fy": said.get("fx"), **middle, **said}
-    return Intrinsics(
-        width=width,
-        height=height,
-        projection=Projection.FISHEYE,
-        **{**whole, "distortion": tuple(said.get("distortion", ()))},
-    )
+    whole: dict[str, Any] = {"fy": said.get("fx"), **middle, **said}
+    return Intrinsics(width=width, height=height, projection=Projection.FISHEYE, **whole)

@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import JSON, ColumnElement, Index, bindparam, delete, func, select
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
-from models.geometry.pose import PoseParameters
+from models.geometry.pose import FIELDS, PoseParameters
 from models.monitoring.verdict import Drift, MoveProbabilities
 from service.enums import PoseState
 from service.reasons import Reasons
@@ -231,12 +231,8 @@ def identifiable_sd(drift: Drift) -> dict[str, float | None]:
 def _where_identifiable(
     parameters: PoseParameters, identifiable: tuple[str, ...]
 ) -> dict[str, float | None]:
-    return {
-        "height_m": parameters.height_m if "height" in identifiable else None,
-        "tilt_rad": parameters.tilt_rad if "tilt" in identifiable else None,
-        "roll_rad": parameters.roll_rad if "roll" in identifiable else None,
-        "heading_rad": parameters.heading_rad if "heading" in identifiable else None,
-    }
+    names = ("height", "tilt", "roll", "heading")
+    return {FIELDS[n]: parameters.of(n) if n in identifiable else None for n in names}
 
 
 def forget_later(session: Session, camera_id: str, estimate_id: int) -> None:
