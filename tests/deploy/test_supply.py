@@ -9,7 +9,7 @@ from tests.conftest import ROOT
 
 LOCKS = sorted((ROOT / "deploy" / "lock").glob("*.txt"))
 COMMANDS = sorted(path for path in (ROOT / ".ci").iterdir() if path.is_file())
-SECURITY = (ROOT / "docs" / "security.md").read_text()
+SECURITY = (ROOT / "tests" / "security.md").read_text()
 
 
 @pytest.mark.parametrize("path", LOCKS, ids=lambda path: path.name)
