@@ -48,7 +48,7 @@ class EstimateRecord(Record):
     `pose` is the served one: the prior's where the tracks leave it open. `drift_by` and `pose_sd`
     are the estimator's for all four parameters; `identifiable` names those that count.
     `raw` has each estimator's own answer. `model_id` is of the averaged estimate beside the served
-    one. Estimates of before there were flow maps have no `heading_sd_rad`.
+    one.
     """
 
     __tablename__ = "estimates"
