@@ -33,6 +33,7 @@ MODEL_ROOMS = [
     {"compiled"},
     {"serialization", "quantiles", "durations"},
     {"geometry"},
+    {"rows"},
     {"pictures"},
     {"tracks"},
     {"simulation"},

@@ -140,12 +140,7 @@ class PoseParameters:
     @classmethod
     def of_pose(cls, pose: CameraPose) -> Self:
         """Those of a pose."""
-        return cls(
-            height_m=pose.height_m,
-            tilt_rad=pose.tilt_rad,
-            roll_rad=pose.roll_rad,
-            heading_rad=pose.heading_rad,
-        )
+        return cls(**{field: getattr(pose, field) for field in FIELDS.values()})
 
     @classmethod
     def of_array(cls, values: Array) -> Self:
