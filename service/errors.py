@@ -107,10 +107,7 @@ class PreconditionRequiredError(_VersionError):
 def check_version(what: str, now: str, asked: str | None) -> None:
     """Refuse a change that was not made of what is stored.
 
-    Args:
-        what: is changed, "the camera is".
-        now: its ETag.
-        asked: that of `If-Match`, or *; None where there was none.
+    `what` is "the camera is", say; `asked` is that of `If-Match`, or *.
 
     Raises:
         PreconditionRequiredError: none was asked for.

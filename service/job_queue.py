@@ -158,8 +158,8 @@ def queue_of(session: Session) -> JobQueue:
 def migrate_engine_tables(settings: Settings) -> None:
     """Create or upgrade the engine's own tables; they are not Alembic's.
 
-    Jobs that are no JSON, of releases that kept pickles or of whoever wrote them, are deleted; the
-    upkeep queues anew what is still to be done.
+    Jobs that are no JSON, whoever wrote them, are deleted; the upkeep queues anew what is still to
+    be done.
     """
     logging.getLogger("dbos").setLevel(logging.WARNING)
     DBOS.migrate(settings.store_url)

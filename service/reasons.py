@@ -57,7 +57,7 @@ CODES = tuple(_CODES)
 
 
 def as_said(text: str) -> Reasons:
-    """A sentence of before there were codes."""
+    """A sentence that has no code of its own."""
     return (Reason(code=ServiceCode.AS_SAID, values={"text": text}),)
 
 

@@ -88,11 +88,7 @@ def camera_of(body: dict[str, Any]) -> Camera:
     if ("lens" in body) == ("intrinsics" in body):
         raise ShapeError("intrinsics, lens: one of both is needed")
     try:
-        if "lens" in body:
-            lens = lens_of(**body["lens"])
-        else:
-            said = dict(body["intrinsics"])
-            lens = Intrinsics(**{**said, "distortion": tuple(said.get("distortion", ()))})
+        lens = lens_of(**body["lens"]) if "lens" in body else Intrinsics(**body["intrinsics"])
         camera = Camera(intrinsics=lens, prior_pose=Pose(**prior))
     except (KeyError, TypeError) as error:
         raise ShapeError(f"intrinsics or lens, prior_pose: {error}") from error

@@ -34,6 +34,7 @@ MODEL_ROOMS = [
     {"compiled"},
     {"serialization", "quantiles", "durations"},
     {"geometry"},
+    {"rows"},
     {"pictures"},
     {"tracks"},
     {"simulation"},

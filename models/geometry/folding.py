@@ -11,8 +11,7 @@ _NO_DISTORTION = 1e-9  # a coefficient that moves no pixel
 def first_fold(slope: Sequence[float]) -> float:
     """The least r above 0 at which a slope, a polynomial in r^2, is 0; infinite where it never is.
 
-    Args:
-        slope: its coefficients, that of the highest power first.
+    `slope` has the coefficient of the highest power first.
     """
     roots = np.roots(np.where(np.abs(slope) < _NO_DISTORTION, 0.0, slope))
     real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real

@@ -28,11 +28,7 @@ def pixel_from_ground(
 ) -> tuple[Array, Mask]:
     """Pixels (..., N, 2) of ground points (..., N, 2), and which are valid (..., N).
 
-    Args:
-        intrinsics: the lens.
-        rotation: `camera_from_world` (..., 3, 3).
-        centre_m: camera centres in the world (..., 3).
-        ground_m: x and y in the world (..., N, 2), metres.
+    `rotation` (..., 3, 3) is `camera_from_world`, `centre_m` (..., 3) the camera's in the world.
 
     Points behind the camera or folded back by the distortion are NaN and not valid; valid points
     may lie outside the image.
@@ -179,10 +175,7 @@ def walking_speed(
 
     By distance rather than by time, people who stand and wait do not count as slow walkers.
 
-    Args:
-        intrinsics: the lens.
-        pose: of the camera.
-        tracks: of each person increasing times (N,) and pixels of the foot (N, 2).
+    `tracks` has increasing times (N,) and pixels of the foot (N, 2) of each person.
     """
     found = [_strides(intrinsics, pose, time_s, uv) for time_s, uv in tracks]
     steps, times = np.concatenate([np.zeros((2, 0)), *found], axis=1)

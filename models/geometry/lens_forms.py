@@ -21,14 +21,9 @@ def lens_of(
 ) -> Intrinsics:
     """The lens in pixels, of a picture of that size.
 
-    Args:
-        width: of the picture.
-        height: of the picture.
-        hfov_deg: from the left edge of the picture to the right; without distortion.
-        focal_mm: the focal length, with the sensor's size; without distortion.
-        sensor_mm: width and height of the sensor.
-        fisheye: `fx` and perhaps `fy` (square pixels), `cx`, `cy` (the middle) and `distortion`,
-            k1 to k4 of `cv2.fisheye`.
+    `hfov_deg` is from the left edge of the picture to the right, `sensor_mm` the sensor's width and
+    height; both forms are without distortion. `fisheye` has `fx` and perhaps `fy` (square pixels),
+    `cx`, `cy` (the middle) and `distortion`, k1 to k4 of `cv2.fisheye`.
 
     Raises:
         ShapeError: not one of the three is given, or it makes no lens.
@@ -52,10 +47,5 @@ def lens_of(
     assert fisheye is not None
     said = {name: value for name, value in fisheye.items() if value is not None}
     middle = {"cx": (width - 1) / 2, "cy": (height - 1) / 2}
-    whole = {"fy": said.get("fx"), **middle, **said}
-    return Intrinsics(
-        width=width,
-        height=height,
-        projection=Projection.FISHEYE,
-        **{**whole, "distortion": tuple(said.get("distortion", ()))},
-    )
+    whole: dict[str, Any] = {"fy": said.get("fx"), **middle, **said}
+    return Intrinsics(width=width, height=height, projection=Projection.FISHEYE, **whole)

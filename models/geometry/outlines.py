@@ -99,10 +99,7 @@ def _shares(outline: Outline, now: View) -> tuple[float, float]:
 def clipped(points: Array, planes: Array, *, closed: bool) -> Array:
     """A polygon (M, 3), or an open line, of what of another (N, 3) is on the positive sides.
 
-    Args:
-        points: its corners.
-        planes: normals (K, 3) of planes through the origin.
-        closed: whether the last corner is joined to the first.
+    `planes` are normals (K, 3) of planes through the origin.
 
     Source: Sutherland and Hodgman, "Reentrant Polygon Clipping", 1974.
     """

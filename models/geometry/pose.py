@@ -140,22 +140,17 @@ class PoseParameters:
     @classmethod
     def of_pose(cls, pose: CameraPose) -> Self:
         """Those of a pose."""
-        return cls(
-            height_m=pose.height_m,
-            tilt_rad=pose.tilt_rad,
-            roll_rad=pose.roll_rad,
-            heading_rad=pose.heading_rad,
-        )
+        return cls(**{field: getattr(pose, field) for field in FIELDS.values()})
 
     @classmethod
-    def of_array(cls, values: Array, heading_rad: float = 0.0) -> Self:
+    def of_array(cls, values: Array) -> Self:
         """Those of tilt, roll, log height (3,), or of these and the heading (4,)."""
         tilt, roll, log_height, *heading = (float(value) for value in values)
         return cls(
             height_m=math.exp(log_height),
             tilt_rad=tilt,
             roll_rad=roll,
-            heading_rad=heading[0] if heading else heading_rad,
+            heading_rad=heading[0] if heading else 0.0,
         )
 
     @classmethod

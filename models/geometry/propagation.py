@@ -28,10 +28,8 @@ def error_ellipses(placed: Placed, pose: CameraPose, covariance: Array) -> Array
     The angle is from the first axis towards the second, in (-pi/2, pi/2]; 39 % of a Gaussian are
     within one sd, 95 % within 2.45.
 
-    Args:
-        placed: the points as a function of the pose; x and y of the camera are known.
-        pose: the estimated one.
-        covariance: of its tilt, roll, log height, heading (4, 4).
+    `placed` gives the points of a pose, whose x and y are known; `covariance` (4, 4) is of its
+    tilt, roll, log height, heading.
 
     Source: Hartley and Zisserman, "Multiple View Geometry", 2nd edition, result 5.6.
     """

@@ -162,9 +162,7 @@ def angle_between(first_wxyz: Any, second_wxyz: Any) -> Array:
 def mean_quaternion(quaternions_wxyz: Array, weights: Array | None = None) -> Array:
     """Mean orientation (..., 4), w >= 0, of quaternions (..., N, 4); q and -q count as one.
 
-    Args:
-        quaternions_wxyz: unit quaternions (..., N, 4).
-        weights: (..., N), not negative; all one if left out.
+    `weights` (..., N) are not negative; all one if left out.
 
     Source: Markley et al., "Averaging Quaternions", JGCD 30(4), 2007, eq. 12-13.
     """

@@ -10,10 +10,8 @@ from models.geometry.rotation import Array, Mask
 def stature_ratio(rotation: Array, foot_rays: Array, top_y: Array) -> tuple[Array, Array]:
     """Heights (N,) of poles as shares of the camera's height, and ground points (N, 2) likewise.
 
-    Args:
-        rotation: `camera_from_world` (3, 3).
-        foot_rays: directions (N, 3), z = 1, of the feet in the camera frame, below the horizon.
-        top_y: undistorted, normalised image y (N,) of the top edge: y / z in the camera frame.
+    `foot_rays` (N, 3), z = 1, are of the camera frame, below the horizon; `top_y` (N,) is the
+    undistorted, normalised y / z of the top edge there.
 
     Only the top edge's y is used: the box of a person in a rolled picture is wider than they are,
     and its middle is not their head. The pole's top (p, s - 1), camera at the origin and of height

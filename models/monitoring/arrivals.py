@@ -80,12 +80,9 @@ def learn_arrivals(
 ) -> ArrivalProcess:
     """Arrival process of hours in a row.
 
-    Args:
-        counts: tracks of each hour (H,).
-        cells: which of the 48 hours of a week's profile each is (H,).
-        known: whether it was seen at all: False during an outage (H,).
-        first_hour: the first of them, in hours since the epoch.
-        times_s: when the newest tracks ended, in order (N,); they need not reach back as far.
+    `counts` (H,) are tracks of each hour from `first_hour` since the epoch on, `cells` which of the
+    48 hours of a week's profile each is, `known` False during an outage. `times_s` (N,) are when
+    the newest tracks ended, in order; they need not reach back as far.
     """
     rates = _rates(counts, cells, known)
     usual = np.diff(times_s)
@@ -113,12 +110,9 @@ def chance_of_silence(
 ) -> float:
     """The probability that a silence is as long as this one, after one more walking group.
 
-    Args:
-        process: that of the camera.
-        missed: tracks expected during the silence.
-        silent_s: how long it is: the longer, the more likely is the level another one by now.
-        seen: tracks in the hours before it, which tell the level of the day.
-        expected: tracks expected in these.
+    `missed` tracks were expected during it: the longer it is, the more likely is the level another
+    one by now. In the hours before it `seen` were, of those `expected`: they tell the level of the
+    day.
     """
     missed, seen, expected = (number / process.burst for number in (missed, seen, expected))
     levels = (
@@ -173,9 +167,8 @@ def delay_of(latest_s: Array) -> float:
     Days on which they came far later than on others were those of an outage that was caught up
     with, and do not count.
 
-    Args:
-        latest_s: from a track's end to its being stored, the longest of each day (D,); negative
-            where a clock is ahead.
+    `latest_s` (D,) is the longest of each day from a track's end to its being stored; negative
+    where a clock is ahead.
     """
     middle = float(np.median(latest_s))
     usual = latest_s[latest_s <= max(4 * middle, middle + 900)]

@@ -133,12 +133,9 @@ def chart_result(
 ) -> ChartResult | None:
     """Chart result of now; None of fewer than 16 walking groups.
 
-    Args:
-        chart: of the camera.
-        scores: of its walking groups, in the order of their ends.
-        alarms_a_run: how many false alarms 1000 walking groups may come to.
-        calm_ratio: of its level, below which the chart is calm.
-        calm_groups: how many walking groups in a row it must be, to have calmed down.
+    `scores` are of walking groups in the order of their ends, of whom 1000 may come to
+    `alarms_a_run` false alarms. The chart is calm below `calm_ratio` of its level, for
+    `calm_groups` in a row.
     """
     if len(scores.values) < config.FEWEST_GROUPS:
         return None

@@ -45,12 +45,7 @@ def learn_chart(
     learned by bootstrap: what is taken for usual, the people that there really are, and runs of
     these in blocks are all drawn anew.
 
-    Args:
-        observations: of the tracks, in the order of their ends.
-        prior: where the camera stood.
-        site: how people walk, learned of these or of other tracks.
-        folds: the quarters and the maps of the others.
-        seed: of the bootstrap.
+    `observations` are in the order of the tracks' ends, `site` is learned of these or of others.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.

@@ -68,11 +68,7 @@ def begin_log(chart: DriftChart, to_s: float) -> CreepLog:
 def add_day(log: CreepLog, chart: DriftChart, day: int, scores: GroupScores) -> CreepLog:
     """The log with a day that it does not know yet, and what its groups say of it.
 
-    Args:
-        log: of the same chart.
-        chart: the first of the site.
-        day: from the epoch.
-        scores: of the groups, by the first map and speeds.
+    Scores are by the first map and speeds of the site.
     """
     apart = (chart.bounded(scores.values) - chart.mean).sum(axis=0)
     pull = np.linalg.solve(chart.covariance, _slopes(chart)).T @ apart
@@ -161,10 +157,8 @@ class Creep(TestStatistic):
 def creep_result(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
     """Most likely creep by a log's newest weeks; None of too few people.
 
-    Args:
-        log: of the days.
-        alarms_a_year: how many false ones are allowed of the creep alone.
-        from_s: since when the camera has stood as it does, but for a creep; whole days count.
+    `alarms_a_year` are allowed of the creep alone. Since `from_s` the camera has stood as it does,
+    but for a creep; whole days count.
     """
     scores = ramp_scores(log, from_s)
     if scores is None:

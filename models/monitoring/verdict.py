@@ -102,15 +102,7 @@ def drift_between(
     prior: CameraPose,
     move: MoveProbabilities,
 ) -> Drift:
-    """Drift: pose less prior pose; x and y count as unmoved.
-
-    Args:
-        found: what is estimated.
-        sd: its standard deviations.
-        identifiable: those of tilt, roll, height, heading that the tracks determine.
-        prior: the prior pose.
-        move: how likely one is.
-    """
+    """Drift: pose less prior pose; x and y count as unmoved."""
     drift = Drift(
         by=PoseParameters(
             height_m=found.height_m - prior.height_m,
@@ -162,14 +154,8 @@ def judge(
     drift does not end until it is identifiable again or the chart, which asks for all four, is
     calm. Where nothing is identifiable, nothing changes.
 
-    Args:
-        drift: of the window.
-        limits: what counts.
-        drifted: the parameters that have drifted, by the verdicts before; empty where none has.
-        chart: its result, where there is one.
-        creep: of the weeks up to now, where there is an anchor.
-        enough: whether enough people came since somebody said how the camera stands: of fewer, the
-            pose neither begins nor ends a drift.
+    Of fewer than `enough` people since somebody said how the camera stands, the pose neither begins
+    nor ends a drift.
     """
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
     beyond = _beyond(drift, limits) if enough else {}
@@ -312,11 +298,8 @@ def clock_fault(
     as before: the height grows by that factor and nothing else does. A camera that was raised
     without turning looks the same; one that may have turned has a clock that is right.
 
-    Args:
-        drift: the pose against the prior pose.
-        turned: the probability that an angle changed, given that the camera moved.
-        prior: that pose.
-        frame_rate_hz: what the camera is said to have; 25 frames a second where nobody says.
+    `turned` is how likely an angle changed, given a move; where nobody says `frame_rate_hz` it is
+    25.
     """
     if not set(PLANE_PARAMETERS) <= set(drift.identifiable):
         return None

@@ -259,14 +259,7 @@ def in_view(intrinsics: Intrinsics, candidates: Array, places: Array, size_m: fl
 
 def _lens(intrinsics: Intrinsics) -> Lens:
     seen = intrinsics.pinhole
-    return Lens(
-        fx=float(seen.fx),
-        fy=float(seen.fy),
-        cx=float(seen.cx),
-        cy=float(seen.cy),
-        width=float(seen.width),
-        height=float(seen.height),
-    )
+    return Lens(*(float(getattr(seen, name)) for name in Lens._fields))
 
 
 def _cameras(candidates: Array) -> Cameras:

@@ -79,13 +79,8 @@ def fold_maps(
 ) -> Folds | None:
     """The paths of each three quarters of the groups; None where fewer than 12 groups walk.
 
-    Args:
-        observations: of the tracks.
-        intrinsics: of the camera.
-        at: the known pose (4,).
-        seed: of the quarters; walking groups stay together.
-        weights: of the tracks (tracks,), 0 to 1; 1 unless they are given.
-        chosen: bandwidths, before; they are chosen anew where they do not hold.
+    `at` (4,) is the known pose, `weights` (tracks,) are 0 to 1, else 1. Bandwidths that were
+    `chosen` before are chosen anew where they do not hold.
     """
     walkers = walkers_of(observations, at)
     if walkers.walking_groups < config.FEWEST_GROUPS:

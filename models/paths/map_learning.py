@@ -49,10 +49,7 @@ def best_bandwidths(
 ) -> Bandwidths:
     """The bandwidths that predict people best; parts of the day where it is clear that they do.
 
-    Args:
-        folds: walkers to learn of with their weights, and others to predict.
-        intrinsics: of the camera.
-        at: the known pose (4,).
+    `folds` are walkers to learn of with their weights, and others to predict, at a known pose (4,).
     """
 
     def held_out(bandwidths: Bandwidths) -> Array:
@@ -105,12 +102,8 @@ def learn_map(
 ) -> PathDensityMap:
     """The map of steps seen from a known pose, each counted by its weight (M,).
 
-    Args:
-        placed: the steps on the ground.
-        weight: those of a person add up to how much that person counts.
-        time_s: when each step was (M,).
-        seen_at: which part (N,) of the ground around places (N, 2) that pose sees.
-        bandwidths: of its kernels.
+    Those of a person add up to how much that person counts; `time_s` (M,) is when each was.
+    `seen_at` says which part (N,) of the ground around places (N, 2) that pose sees.
 
     Raises:
         ValueError: no step counts.

@@ -102,10 +102,8 @@ def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:
     So few walking groups in the reference, heavy tails and walking groups that come together all
     raise the level.
 
-    Args:
-        scores: each scored by a map that its people have no part in.
-        bent: how the mean score changes with each parameter (4, 4): a column for a parameter.
-        seed: of the bootstrap.
+    Each is scored by a map that its people have no part in. `bent` (4, 4) is how the mean score
+    changes with each parameter, a column for a parameter.
     """
     count = len(scores)
     covariance = np.cov(scores.T)

@@ -95,13 +95,8 @@ def learn_paths(
     they scatter in runs of walking groups after one another than walking groups do is the inflation
     of their variance.
 
-    Args:
-        observations: of the tracks.
-        intrinsics: of the camera.
-        prior: where it stood.
-        seed: of the quarters and of the bootstrap.
-        weights: what each track (tracks,) counts for, 0 to 1; 1 unless they are given.
-        folds: of the same tracks and seed, where they have been made already.
+    `weights` (tracks,) are what each counts for, 0 to 1, else 1; `folds` are of the same tracks and
+    seed, where they have been made already.
     """
     at = array_of(prior)
     if folds is None:

@@ -158,13 +158,9 @@ def refined(
     A single `variance_inflation` lets directions in which the map is noise drown a belief that is
     sure of them; so from the peak on, each of the map's slopes is taken for as much as it is worth.
 
-    Args:
-        posterior: of walkers.
-        candidate: its peak (4,).
-        shape: of the map's log likelihood there.
-        precision: of the map's part (4, 4).
-        bias: a person's mean score at the truth (4,).
-        warm: from almost the same tracks' pose, where it ends once hardly anything moves.
+    `shape` is of the map's log likelihood at the peak, `precision` (4, 4) its part, `bias` (4,) a
+    person's mean score at the truth. A `warm` one, of almost the same tracks' pose, ends once
+    hardly anything moves.
     """
     _, believed = posterior.belief.gaussian_at(candidate)
     information = precision + believed

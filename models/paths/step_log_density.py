@@ -96,12 +96,8 @@ def likeliest_busyness(
 ) -> float:
     """The level at which the tracks are most likely.
 
-    Args:
-        densities: of the steps.
-        steps: of all tracks.
-        busyness: the levels that are tried.
-        seen: the share (S,) of people on seen ground whom the camera sees.
-        beyond: the share of those on unseen ground, were it as busy.
+    `seen` (S,) is the share of people on seen ground whom the camera sees, `beyond` of those on
+    unseen ground, were it as busy.
     """
     likely, share = busyness.log_prior.copy(), np.zeros(seen.size)
     for number in range(steps.weight.size):
@@ -128,13 +124,8 @@ def likelihood_of_tracks(
 ) -> tuple[Array, Array]:
     """Values (tracks,) and scores (tracks, 4); scores are 0 where there are no slopes.
 
-    Args:
-        densities: of the steps.
-        steps: of all tracks.
-        extra: how dense people are on unseen ground.
-        log_share: of all people, those that the camera sees (S,).
-        d_log_share: its derivatives by the candidate (S, 4).
-        tracks: how many there are.
+    `extra` is how dense people are on unseen ground, `log_share` (S,) of all people those that the
+    camera sees, with derivatives (S, 4) by the candidate.
     """
     values, scores = np.zeros(tracks), np.zeros((tracks, 4))
     sloped = len(densities.slopes) > 0

@@ -34,7 +34,6 @@ LEAST_SPREAD = 0.15
 STANDING_CELLS = 0.2  # of a turn's cells that stand on the screen: masks and dirt fill fewer
 
 # Covariance
-ROBUST = 4.685  # Tukey's biweight: 95 % efficient at the normal distribution
 LEAST_SIGMA_PX = 0.3  # of the analysed picture: of a feature's place, at least
 FEW_INLIERS = (
     75.0  # at which variances double: few match in other light, and err more than they say

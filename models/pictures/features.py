@@ -43,9 +43,9 @@ def _first() -> KnownTurn:
 class Features:
     """Features of a picture of `width` x `height` pixels: no picture can be made of them again.
 
-    Points (N, 2) are pixels, float32; `sizes_px` (N,) the diameters that they are of; descriptors
-    (N, 128) SIFT's, as their square roots, uint8. `analysed` is the share to which the picture was
-    scaled down before: places are as good as its pixels. `known` is where a reference looks.
+    Points (N, 2) are pixels, float32; descriptors (N, 128) SIFT's, as their square roots, uint8.
+    `analysed` is the share to which the picture was scaled down before: places are as good as its
+    pixels. `known` is where a reference looks.
 
     Raises:
         ShapeError: arrays of other shapes or types, or numbers that are not finite.
@@ -54,7 +54,6 @@ class Features:
     """
 
     points_px: npt.NDArray[np.float32]
-    sizes_px: npt.NDArray[np.float32]
     descriptors: Pixels
     width: int
     height: int
@@ -66,15 +65,14 @@ class Features:
         count = len(self.points_px)
         shapes: dict[str, tuple[npt.NDArray[Any], tuple[int, ...], type]] = {
             "points_px": (self.points_px, (count, 2), np.float32),
-            "sizes_px": (self.sizes_px, (count,), np.float32),
             "descriptors": (self.descriptors, (count, _DESCRIPTOR), np.uint8),
             "edges": (self.measures.edges, EDGE_CELLS[::-1], np.uint8),
         }
         for name, (array, shape, kind) in shapes.items():
             if array.shape != shape or array.dtype != kind:
                 raise ShapeError(f"{name}: {shape} of {kind.__name__} is needed, got {array.shape}")
-        if not (np.isfinite(self.points_px).all() and np.isfinite(self.sizes_px).all()):
-            raise ShapeError("points_px, sizes_px: must be finite")
+        if not np.isfinite(self.points_px).all():
+            raise ShapeError("points_px: must be finite")
         for side in (self.width, self.height):
             if not config.LEAST_SIDE_PX <= side <= config.MOST_SIDE_PX:
                 raise ShapeError(_side_limit(side))
@@ -105,14 +103,12 @@ def describe(
     grey: Pixels,
     *,
     boxes: Array | None = None,
-    max_features: int = config.MAX_FEATURES,
 ) -> Features:
     """The features of a picture in grey.
 
     Args:
         grey: (H, W) uint8. What is larger than `ANALYSED_PX` is scaled down.
         boxes: x1, y1, x2, y2 (N, 4) in pixels, of people, who are left out.
-        max_features: at most so many, the clearest.
 
     Raises:
         ShapeError: no picture in grey, or too small or large a one; boxes of another shape.
@@ -122,15 +118,13 @@ def describe(
     share = min(1.0, config.ANALYSED_PX / max(width, height))
     size = (round(width * share), round(height * share))
     small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA) if share < 1 else grey
-    sift = cv2.SIFT.create(nfeatures=max_features, contrastThreshold=config.CONTRAST)
+    sift = cv2.SIFT.create(nfeatures=config.MAX_FEATURES, contrastThreshold=config.CONTRAST)
     found, raw = sift.detectAndCompute(small, _outside(boxes, size, share))
     points = np.array([each.pt for each in found], np.float32).reshape(-1, 2)
-    sizes = np.array([each.size for each in found], np.float32)
     # Integers are pixel centres: the picture's corner is at (-0.5, -0.5), whatever its size.
     factor = np.array([width / size[0], height / size[1]], np.float32)
     return Features(
         points_px=np.asarray((points + 0.5) * factor - 0.5, np.float32),
-        sizes_px=np.asarray(sizes * factor[0], np.float32),
         descriptors=_rooted(raw),
         width=width,
         height=height,

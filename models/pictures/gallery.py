@@ -56,10 +56,7 @@ def renewed(gallery: Sequence[Features], now: Features, turn: Turn | None) -> tu
     The first stays: one that shows too little, in fog say, begins no gallery. A picture that is
     much turned, or whose turn is not sure, becomes none.
 
-    Args:
-        gallery: its references, the first of which is what all are turned against.
-        now: the picture.
-        turn: its turn against the first, of `best_turn`.
+    Turns are against the first of the gallery, as of `best_turn`.
     """
     kept = list(gallery)
     if not kept:
@@ -90,10 +87,7 @@ def bridged(gallery: Sequence[Features], between: Features, turn: Turn) -> tuple
     The camera stood in one before it and in one after it, so it stood in between, as far as it
     sways: what matches neither of their lights is known by that.
 
-    Args:
-        gallery: its references.
-        between: the picture.
-        turn: of the next picture that matched, against the first.
+    `turn` is of the next picture that matched, against the first.
     """
     if not _may_be_reference(turn) or not _may_be_first(between):
         return tuple(gallery)

@@ -34,12 +34,8 @@ def judge(
 
     Without a gallery only a frozen or a black picture can be told.
 
-    Args:
-        now: of the newest picture.
-        gallery: of the references.
-        unchanged_s: for how long all pictures have had this one's `digest`.
-        matched: whether a turn against the gallery was found: then it is no other scene, and
-            nothing covers it.
+    All pictures have had this one's `digest` for `unchanged_s`. One that `matched` the gallery is
+    no other scene, and nothing covers it.
     """
     if unchanged_s >= config.FROZEN_S:
         return PictureFault.FROZEN

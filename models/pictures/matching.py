@@ -21,9 +21,8 @@ class Matches:
 
     `still` stand at the same place of the screen, `overlay` where clocks are written, too;
     `cells` (M,) number the part of the first picture that they are in, and `weights` (M,) what
-    they count for, so that what fills a few cells is no crowd. `sigma_px` (M,) is how well their
-    places are known, and `focal_px` the second picture's focal length, by which residuals are
-    pixels.
+    they count for, so that what fills a few cells is no crowd. `focal_px` is the second picture's
+    focal length, by which residuals are pixels.
     """
 
     reference: Array
@@ -32,7 +31,6 @@ class Matches:
     overlay: Mask
     cells: Indices
     weights: Array
-    sigma_px: Array
     focal_px: float
     tolerance_px: float
 
@@ -83,7 +81,7 @@ def match(reference: Features, now: Features, intrinsics: Intrinsics) -> Matches
         lens.rays(place) for lens, place in zip(lenses, points, strict=True)
     )
     both = seen & also
-    first, second, ray, other = first[both], second[both], ray[both], other[both]
+    ray, other = ray[both], other[both]
     places, others = points[0][both], points[1][both]
     size = np.array([reference.width, reference.height])
     ratio = now.width / reference.width
@@ -96,7 +94,6 @@ def match(reference: Features, now: Features, intrinsics: Intrinsics) -> Matches
     cell = np.clip((places + 0.5) / size * config.CELLS, 0, np.array(config.CELLS) - 1).astype(int)
     cells = cell[:, 0] + config.CELLS[0] * cell[:, 1]
     crowd = np.bincount(cells, minlength=config.CELLS[0] * config.CELLS[1])[cells]
-    sizes = np.stack([reference.sizes_px[first] * ratio, now.sizes_px[second]])
     return Matches(
         reference=ray,
         now=other,
@@ -104,7 +101,6 @@ def match(reference: Features, now: Features, intrinsics: Intrinsics) -> Matches
         overlay=still & band,
         cells=cells,
         weights=np.minimum(1.0, config.OF_A_CELL / np.maximum(crowd, 1)),
-        sigma_px=np.maximum(sizes.max(axis=0), 2.0 / now.analysed),
         focal_px=(lenses[1].fx + lenses[1].fy) / 2,
         tolerance_px=config.TOLERANCE * max(now.width, now.height),
     )

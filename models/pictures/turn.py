@@ -37,10 +37,9 @@ class Turn:
     log of the focal length now by that before. `covariance` (4, 4) is of a small turn on the left
     of R and of the log zoom; floors for light, sway and the lens are in it.
 
-    `inliers` of `matches` agree, `shared` is the share of the old view that is still in sight, and
-    `residual_px` the inliers' usual distance, in pixels of the new picture. `shifted` says that the
-    camera moved aside in a scene of some depth, more likely than that it only turned: then the
-    covariance is wider.
+    `inliers` of `matches` agree, `shared` is the share of the old view that is still in sight.
+    `shifted` says that the camera moved aside in a scene of some depth, more likely than that it
+    only turned: then the covariance is wider.
     """
 
     rotation: Array
@@ -49,7 +48,6 @@ class Turn:
     inliers: int
     matches: int
     shared: float
-    residual_px: float
     shifted: bool
 
     @property
@@ -86,10 +84,7 @@ def turn_between(reference: Features, now: Features, intrinsics: Intrinsics) -> 
 
     That is no evidence of a move: it may be night, fog, or a lorry before the camera.
 
-    Args:
-        reference: of the picture before.
-        now: of the newer one, of any size.
-        intrinsics: of the camera; scaled to the pictures' sizes.
+    Pictures may be of any size: the lens is scaled to theirs.
     """
     matches = match(reference, now, intrinsics)
     # A clock in the picture stands whatever the camera does.
@@ -203,7 +198,6 @@ def _refined(
         inliers=int(agree.sum()),
         matches=len(matches),
         shared=_shared(rotation, log_zoom, reference, now, intrinsics),
-        residual_px=float(np.median(length[agree])),
         shifted=shifted,
     )
 

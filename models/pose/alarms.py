@@ -56,13 +56,8 @@ def alarm_chart_result(
 
     None, too, of a site without paths or a chart.
 
-    Args:
-        tracks: of the window, in the order of their ends.
-        site: of the camera.
-        rate: of false alarms, which sets the level.
-        counted: which tracks (tracks,) count; all unless it is given. Once a person has said that
-            the camera is where it should be, the chart begins anew.
-        first: the first track after a change.
+    Tracks are in the order of their ends; those `counted` (tracks,) count, all unless it is given.
+    Once a person has said that the camera is where it should be, the chart begins anew.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -138,10 +133,7 @@ def begin_creep_log(first: CameraSite, to_s: float) -> CreepLog | None:
 def log_creep(log: CreepLog, tracks: Observations, first: CameraSite) -> CreepLog:
     """The log with the days of tracks that it does not have yet; these have to be whole days.
 
-    Args:
-        log: of the first site.
-        tracks: in the order of their ends.
-        first: the site as it was first learned, never grown.
+    `first` is the site as it was first learned, never grown.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -166,12 +158,7 @@ def without_creep(
 ) -> list[Trajectory | None]:
     """Each track as it would be seen had the camera not crept; None where it would be out of sight.
 
-    Args:
-        tracks: of a camera that stands, or creeps.
-        intrinsics: of it.
-        prior: its prior pose.
-        log: of its days.
-        from_s: since when it has stood as it does, but for a creep.
+    Since `from_s` the camera has stood as it does, but for a creep.
     """
     ended_s = np.array([track.time_s[-1] for track in tracks])
     turns = posterior_mean_turns(log, ended_s / DAY_S, from_s)

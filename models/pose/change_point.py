@@ -46,12 +46,9 @@ def find_change(
     better, and the cut moves to where that is most so. The two poses must then differ beyond
     doubt, by their own covariances.
 
-    Args:
-        observations: of the tracks.
-        prior: where the camera was, with the heading that it has by now.
-        reference: how people walk at the site.
-        warm_start: the fit of all tracks with that heading, where a change is hardly suspected:
-            both sides are fitted from there, and as without it if they are somewhat apart.
+    `prior` has the heading that the camera has by now; so has `warm_start`, the fit of all tracks,
+    where a change is hardly suspected: both sides are fitted from there, and as without it if they
+    are somewhat apart.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -214,13 +211,6 @@ def widened(
     The cut is where it suits the tracks best. One group on its wrong side would move the pose by
     the way between the two poses over the number of groups. And no parameter is surer than so many
     people can make it: few of them, who walk alike, may seem to agree.
-
-    Args:
-        before: of the tracks before the change.
-        after: of those after it.
-        walking_groups: that walk after it.
-        speed_reference: how people walk at the site.
-        paths: where they do, if that is known.
     """
     offset = (after.values - before.values) / max(walking_groups, 1)
     floor = least_covariance(walking_groups, speed_reference, paths)

@@ -93,13 +93,9 @@ def estimate_pose(
     The search by paths may fail: the pose is by speeds alone then, and the failure is named. Of
     a site that was not learned, all tracks count and the walking speed is assumed.
 
-    Args:
-        tracks: of the window, in the order of their ends.
-        site: of the camera.
-        warm_start: of the finding of almost the same tracks at the same site, the newest of them
-            left out and some older ones: where nothing speaks against it, its pose is refined,
-            which takes a quarter to a half of the time and comes to the same.
-        picture: what the newest picture says, where one matched: it counts in the posterior alone.
+    `warm_start` is of the finding of almost the same tracks at the same site: where nothing speaks
+    against it, its pose is refined, which takes a quarter to a half of the time and comes to the
+    same.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -184,11 +180,8 @@ def search_change(
     Where people walk another way than before, or elsewhere, a window is suspected; it is cut
     where the parts before and after, each estimated alone, are of two poses beyond doubt.
 
-    Args:
-        tracks: of the window, in the order of their ends.
-        site: how people walk, and where, if that is known.
-        warm_start: the pose of almost the same tracks: where nothing speaks against it, no others
-            are searched, and no change is.
+    Where nothing speaks against `warm_start`, the pose of almost the same tracks, no others are
+    searched, and no change is.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.

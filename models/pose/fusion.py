@@ -56,11 +56,8 @@ def fused_estimate(
     likelihood. That of the speeds is a Gaussian around its mode; that of the places is evaluated
     there, and the speeds are fitted again with the heading that comes of it.
 
-    Args:
-        tracks: of one pose.
-        site: with the paths of its people, if they are known.
-        joint: by speeds, the heading taken for the prior pose's.
-        warm_start: the pose of almost the same tracks; without one, poses all around are tried.
+    `joint` takes the prior pose's heading. Without `warm_start`, the pose of almost the same
+    tracks, poses all around are tried.
     """
     paths, prior = site.paths, site.prior
     if paths is None:

@@ -148,12 +148,9 @@ def pose_posterior(
 ) -> PosePosterior:
     """The posterior over what moved, by an estimate of a window.
 
-    Args:
-        fused: of the window. Of one whose heading the paths do not hold, the heading says nothing.
-        walking_groups: that it is of: few tell less surely what their covariance is, and too few
-            nothing.
-        prior: the prior pose.
-        moved_prior: how likely it is, before any track, that the camera has moved.
+    Few walking groups tell less surely what their covariance is, and too few nothing; of a heading
+    that the paths do not hold, the estimate says nothing. `moved_prior` is how likely a move is
+    before any track.
     """
     seen = seen_parameters(fused, walking_groups)
     offset = fused.values - array_of(prior)
@@ -218,12 +215,8 @@ def off_sd_at_odds(
 
     In standard deviations; infinite where none is far enough.
 
-    Args:
-        log_odds: of a move in that parameter against standing.
-        variances: of estimates (S, N).
-        seen: of which parameters (4,) tracks say something: S of them.
-        walking_groups: of the windows (N,).
-        moved_prior: how likely it is, before any track, that the camera has moved.
+    `variances` (S, N) are of the S parameters that are `seen` (4,), `walking_groups` (N,) of the
+    windows.
     """
     priors = log_prior(moved_prior)[: len(_SUBSETS)]
     alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])

@@ -59,13 +59,8 @@ def find_modes(
 ) -> list[Mode]:
     """The modes that are climbed to from several headings and from poses by speeds, the best first.
 
-    Args:
-        posterior: of walkers, with the belief of the joint estimate.
-        tracks: whose speeds are fitted again.
-        site: of the camera.
-        joint: by speeds, the heading taken for the prior pose's.
-        warm_start: whose modes alone are climbed from, where there is one.
-        headings: that are tried, from the prior pose's on (radians).
+    `headings` are from the prior pose's on (radians). With a `warm_start` its modes alone are
+    climbed from.
     """
     if warm_start is None:
         begin = _from_afar(posterior, joint, headings)

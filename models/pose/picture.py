@@ -57,10 +57,7 @@ class PictureEvidence:
     def of_poses(cls, prior: CameraPose, after: CameraPose, covariance: Array) -> Self:
         """That of a camera that stood at the prior pose in the first picture of its gallery.
 
-        Args:
-            prior: the prior pose.
-            after: as `models.pictures.turn.turned_pose` has it.
-            covariance: as `turned_covariance` has it.
+        `after` is as of `models.pictures.turn.turned_pose`, `covariance` as of `turned_covariance`.
 
         Raises:
             ShapeError: as of the evidence itself.
@@ -72,9 +69,8 @@ class PictureEvidence:
     def log_density(self, means: Array, covariances: Array) -> Array:
         """Log densities (K,) of what it says, of a camera that turned about so far.
 
-        Args:
-            means: turns (K, 3) in tilt, roll and heading.
-            covariances: of them (K, 3, 3), the picture's own not among it.
+        `means` (K, 3) are turns in tilt, roll and heading, `covariances` (K, 3, 3) without the
+        picture's own.
         """
         scales = covariances + self.covariance
         off = self.offset - means
@@ -87,10 +83,7 @@ def with_picture(
 ) -> PosePosterior:
     """The posterior over what moved by people and a picture.
 
-    Args:
-        people: the posterior by people, newer than whose oldest the picture is.
-        picture: of now.
-        moved_prior: how likely it was before both that the camera has moved.
+    The picture is newer than the oldest of the people; `moved_prior` is of before both.
     """
     prior = np.exp(log_prior(moved_prior))
     moves = move_covariances() + np.diag(config.REST_SD**2)

@@ -30,12 +30,7 @@ def smallest_told(
     tracks say nothing. An estimate's variance falls with its people, but for what it has of the
     reference's.
 
-    Args:
-        fused: the estimate of a window.
-        walking_groups: that it is of.
-        people: who walk in it.
-        reference_people: who made the site's map.
-        moved_prior: how likely it is, before any track, that the camera has moved.
+    `people` walk in the window, `reference_people` made the site's map.
     """
     found = np.full((len(PARAMETERS), PEOPLE.size), np.nan)
     seen = seen_parameters(fused, walking_groups)

@@ -62,11 +62,8 @@ def self_calibrate(
 ) -> SelfCalibration:
     """The pose that explains people best.
 
-    Args:
-        trajectories: in the order of their ends.
-        intrinsics: of the camera.
-        walk: how fast people are taken to walk.
-        measured: what somebody has measured of `tilt_rad`, `roll_rad`, `height_m`.
+    They are in the order of their ends. `measured` is what somebody has of `tilt_rad`, `roll_rad`,
+    `height_m`.
 
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step.

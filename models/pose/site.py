@@ -67,18 +67,10 @@ def learn_site(
     A map that grows is learned anew of all tracks that are known to be of the prior pose, older
     ones by less weight; how people walk there stays what the reference said, as an anchor.
 
-    Args:
-        tracks: of the reference, or of all that a map grows by, in the order of their ends.
-        intrinsics: of the camera.
-        prior: where it stood.
-        walk: how fast people are taken to walk before any are seen.
-        seed: of all that is drawn.
-        speed_reference: how people walk, where that was learned before: then it is not learned
-            again.
-        weights: what each track (tracks,) counts for in the map, 0 to 1; 1 unless they are given.
-        speed_tracks: learn how people walk of so many of the first tracks; of all unless given.
-        chart: whether the chart is wanted: it takes as long as all the rest.
-        chosen: the bandwidths of the map that grows, which are kept for some hours.
+    Tracks are in the order of their ends; `weights` (tracks,) are what each counts for in the map,
+    0 to 1, else 1. How people walk is learned of so many `speed_tracks` first ones, of all unless
+    given, not at all where a `speed_reference` is. The `chart` takes as long as all the rest.
+    Bandwidths that were `chosen` before are kept for some hours.
 
     Raises:
         TooFewTrajectoriesError: fewer than 5 tracks with a step, and how people walk is not known.

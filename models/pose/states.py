@@ -30,11 +30,7 @@ def state_of(
 ) -> WindowState:
     """The state by a window.
 
-    Args:
-        posterior: over what moved.
-        fused: the estimate that it is by.
-        drifting: whether the verdict is that the camera moved.
-        mapped: whether the site's paths are known: without them nobody can tell a turn in heading.
+    `drifting` is the verdict. Unless paths are `mapped`, nobody can tell a turn in heading.
     """
     if drifting:
         return WindowState.DRIFTING

@@ -47,10 +47,7 @@ def average_windows(
 ) -> tuple[Index, TrackPredictions]:
     """One prediction for each track that has windows: their owners, and the means.
 
-    Args:
-        height_m: of each window (B,).
-        quaternion_wxyz: of each window (B, 4).
-        owner_idx: the track of each window (B,).
+    Heights (B,) and quaternions (B, 4) are of windows, `owner_idx` (B,) says of which track.
     """
     owners = np.unique(owner_idx)
     rows = [np.flatnonzero(owner_idx == owner) for owner in owners]

@@ -134,11 +134,7 @@ def network_for(recipe: Recipe) -> PoseRegressor:
 def pose_loss(output: Tensor, height_m: Tensor, quaternion: Tensor, alpha: float) -> Tensor:
     """Mean of `|h* - h| + alpha * ||q* - q/||q|| ||` over a batch; q and -q count as one.
 
-    Args:
-        output: raw network output (B, 5), height in metres.
-        height_m: true heights (B,).
-        quaternion: true unit quaternions wxyz (B, 4).
-        alpha: weight of the orientation.
+    `output` (B, 5) is raw, heights (B,) are in metres, quaternions (B, 4) of length 1, wxyz.
 
     Source: Xu et al. 2020, section 3.3.
     """

@@ -1,9 +1,12 @@
 """Configuration of a training, and the place of its weights; without torch, for other processes."""
 
+import time
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from models.durations import HOUR_S
 from models.errors import CheckpointError, ShapeError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -142,7 +145,27 @@ def plan_from_config(config: dict[str, Any]) -> TrainingPlan:
         raise CheckpointError(f"config: not of this version: {error}") from error
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainingProgress:
+    """Progress of a training; `loss` is the mean over the last epoch so far."""
+
+    step: int
+    steps: int
+    loss: float
+    eta_s: float
+
+
 def weights_path(folder: Path, digest: str) -> Path:
     """The file in a folder for weights with this SHA-256."""
     # A name alone: what a database or an archive says leads out of no folder.
     return folder / f"{Path(digest).name}.safetensors"
+
+
+def unused_weights(folder: Path, used: Collection[str]) -> list[Path]:
+    """Files of weights that nobody uses, by their SHA-256, and that are not being written now."""
+    written_before_s = time.time() - HOUR_S
+    return [
+        path
+        for path in folder.glob("*")
+        if path.name.split(".")[0] not in used and path.stat().st_mtime < written_before_s
+    ]

@@ -20,22 +20,12 @@ from models.regression.dataset import (
     walks_of,
 )
 from models.regression.network import PoseRegressor, pose_from_output, pose_loss
-from models.regression.recipe import Recipe, TrainingPlan
+from models.regression.recipe import Recipe, TrainingPlan, TrainingProgress
 from models.simulation.poses import repeated_pose
 
 _HELD_OUT_WALKS = 2000
 _CENTRING_WALKS = 4000
 _MUST_BEAT = 0.8  # of the error that answering the prior pose always would make
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrainingProgress:
-    """Progress of a training; `loss` is the mean over the last epoch so far."""
-
-    step: int
-    steps: int
-    loss: float
-    eta_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

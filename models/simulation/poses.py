@@ -10,6 +10,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Index, rotation_from_angles
 from models.geometry.upright import heads_above, heads_seen, statures, tops_seen
+from models.rows import rows_of
 from models.tracks.trajectory import Trajectory
 
 
@@ -40,14 +41,7 @@ class PoseSet:
 
     def take(self, indices: Index) -> "PoseSet":
         """The poses at the given places, in that order."""
-        return PoseSet(
-            height_m=self.height_m[indices],
-            tilt_rad=self.tilt_rad[indices],
-            roll_rad=self.roll_rad[indices],
-            heading_rad=self.heading_rad,
-            x_m=self.x_m,
-            y_m=self.y_m,
-        )
+        return rows_of(self, indices)
 
     @property
     def rotation(self) -> Array:

@@ -50,10 +50,7 @@ def link_pieces(
     that counts as a person of its own does less harm than two people taken for one. The order in
     which the tracks are given changes nothing.
 
-    Args:
-        trajectories: of one camera.
-        intrinsics: of its lens.
-        pose: about where it stands, its prior pose.
+    `pose` is about where the camera stands, its prior pose.
     """
     before = np.full(len(trajectories), -1, dtype=np.int64)
     if len(trajectories) < 2:

@@ -9,6 +9,7 @@ import numpy as np
 
 from models.errors import ShapeError
 from models.geometry.rotation import Array, Index, Mask
+from models.rows import rows_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,15 +88,8 @@ class HeadFootPairs:
         renumber = np.full(self.owners, -1)
         renumber[chosen] = np.arange(chosen.size)
         kept = renumber[self.owner_idx] >= 0
-        return HeadFootPairs(
-            foot_rays=self.foot_rays[kept],
-            head_rays=self.head_rays[kept],
-            column_rays=self.column_rays[kept],
-            from_rays=self.from_rays[kept],
-            to_rays=self.to_rays[kept],
-            owner_idx=renumber[self.owner_idx[kept]],
-            owners=int(chosen.size),
-        )
+        owner_idx = renumber[self.owner_idx[kept]]
+        return rows_of(self, kept, owner_idx=owner_idx, owners=int(chosen.size))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,11 +137,7 @@ def of_tracks(observations: Observations, chosen: Index) -> Observations:
     kept_tops = renumber[tops.rows.owner_idx] >= 0
     return Observations(
         steps=replace(steps, rows=_kept(steps.rows, every, renumber, chosen.size)),
-        tops=Tops(
-            foot_rays=tops.foot_rays[kept_tops],
-            top_y=tops.top_y[kept_tops],
-            rows=_kept(tops.rows, kept_tops, renumber, chosen.size),
-        ),
+        tops=rows_of(tops, kept_tops, rows=_kept(tops.rows, kept_tops, renumber, chosen.size)),
         ended_s=observations.ended_s[chosen],
         tracks=int(chosen.size),
         heads=None if observations.heads is None else observations.heads.of_tracks(chosen),
@@ -159,20 +149,8 @@ def steps_where(steps: Steps, kept: Mask) -> Steps:
     rows = steps.rows
     linked = rows.linked.copy()
     linked[1:] &= kept[:-1]
-    return Steps(
-        start_rays=steps.start_rays[kept],
-        end_rays=steps.end_rays[kept],
-        noisy_end_rays=steps.noisy_end_rays[kept],
-        seconds=steps.seconds[kept],
-        rows=_kept(replace(rows, linked=linked), kept, np.arange(rows.owners), rows.owners),
-    )
+    return rows_of(steps, kept, rows=rows_of(replace(rows, linked=linked), kept))
 
 
 def _kept(rows: Rows, kept: Mask, renumber: Index, owners: int) -> Rows:
-    return Rows(
-        owner_idx=renumber[rows.owner_idx[kept]],
-        linked=rows.linked[kept],
-        time_s=rows.time_s[kept],
-        when=rows.when[kept],
-        owners=owners,
-    )
+    return rows_of(rows, kept, owner_idx=renumber[rows.owner_idx[kept]], owners=owners)

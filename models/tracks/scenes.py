@@ -57,7 +57,7 @@ def load_scene(folder: Path) -> Scene:
     try:
         camera = json.loads((folder / "camera.json").read_text())
         lens, pose = camera["intrinsics"], camera["true_pose"]
-        intrinsics = Intrinsics(**{**lens, "distortion": tuple(lens["distortion"])})
+        intrinsics = Intrinsics(**lens)
         tops = _tops(folder / "boxes.csv", intrinsics)
         with (folder / "tracks.csv").open(newline="") as lines:
             rows = [

@@ -9,6 +9,7 @@ import numpy as np
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array, Index, Mask
+from models.rows import rows_of
 from models.tracks import config
 
 WINDOW_MIN_POINTS = 11
@@ -70,12 +71,7 @@ class Trajectory:
 
     def part(self, indices: Index) -> "Trajectory":
         """The points of some indices, in time order."""
-        return Trajectory(
-            time_s=self.time_s[indices],
-            uv=self.uv[indices],
-            top_v=None if self.top_v is None else self.top_v[indices],
-            head_uv=None if self.head_uv is None else self.head_uv[indices],
-        )
+        return rows_of(self, indices)
 
     @property
     def duration_s(self) -> float:
@@ -134,12 +130,7 @@ def points_of(trajectories: Sequence[Trajectory]) -> Points:
 def points_where(points: Points, kept: Mask) -> Points:
     """Some of the points (T,) only; trajectories keep their numbers, with no point if need be."""
     before = np.concatenate([[0], np.cumsum(kept)])
-    return Points(
-        time_s=points.time_s[kept],
-        uv=points.uv[kept],
-        top_v=points.top_v[kept],
-        bounds=before[points.bounds],
-    )
+    return rows_of(points, kept, bounds=before[points.bounds])
 
 
 def most_nodes(points: int, duration_s: float) -> int:

@@ -58,11 +58,8 @@ def observe_walks(
 
     The same tracks give the same, in whatever portions they came.
 
-    Args:
-        trajectories: in the order of their ends.
-        intrinsics: of the camera.
-        pose: about where it stands, its prior pose.
-        before: what `link_pieces` says of them, where that is known by now.
+    They are in the order of their ends, of a camera at about its prior pose; `before` is what
+    `link_pieces` says of them, where that is known by now.
     """
     if before is None:
         before = link_pieces(trajectories, intrinsics, pose)

@@ -157,11 +157,7 @@ def fit_angles(
 ) -> Normal:
     """Tilt and roll (2,) by heads, with the curvature's covariance (2, 2).
 
-    Args:
-        pairs: of the tracks.
-        near: tilt and roll (2,) that the search is around, 24 deg either way.
-        habit: the usual leans at the site.
-        components: of leans.
+    The search is around `near` (2,), 24 deg either way; `habit` is of the usual leans at the site.
     """
     angles = _start(pairs, near, habit, components)
     coefficients, mixed = habit.mean, components.mixed

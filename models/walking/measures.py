@@ -245,12 +245,8 @@ def walking_groups_of(
 ) -> Index:
     """The group (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
 
-    Args:
-        time_s: when each step was (M,).
-        owner_idx: the track of each (M,).
-        place: where it was on the ground (M, 2), metres.
-        direction: unit vectors (M, 2) of where it went.
-        owners: how many tracks there are; those without steps are each a walking group.
+    `time_s` (M,) is when each was, `place` (M, 2) where on the ground in metres, `direction` (M, 2)
+    its unit vector. Tracks without steps are each a walking group.
     """
     since_s = time_s - time_s.min(initial=np.inf)
     time_bin = np.floor(since_s / config.GROUP_BIN_S + 1e-3).astype(np.int64)

@@ -21,10 +21,8 @@ def variance_inflation(
     The earlier half and the later, the quarters by turns, the eighths and the sixteenths: people
     drawn at random would share their hour, and those who are seen afterwards do not.
 
-    Args:
-        tracks: of the reference, in the order of time.
-        error_ratio: e' S^-1 e over the number of parameters, from tracks to train by and to test.
-        assumed: the ratio before any are seen.
+    `tracks` are in the order of time. `error_ratio` is e' S^-1 e over the number of parameters,
+    from tracks to train by and to test; `assumed` is the ratio before any are seen.
     """
     ratios = []
     for fold in range(config.INFLATION_FOLDS):

@@ -50,7 +50,7 @@ def require_claim(session: Session, caller: Caller | None, camera_id: str) -> No
 
 
 def may_claim(session: Session, token_id: str | None, camera_id: str) -> bool:
-    """True if what a token posts may come to count by itself; None: of before there were tokens."""
+    """True if what a token posts may come to count by itself; so may what none does."""
     named = {
         token.id for token in _posting(session, camera_id) if camera_id in (token.cameras or ())
     }

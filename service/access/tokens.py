@@ -71,9 +71,9 @@ class TokenSpec:
     """A token to make: whose, for what, for which cameras and sources (None: all), until when."""
 
     name: str
-    scopes: tuple[str, ...]
-    cameras: tuple[str, ...] | None = None
-    sources: tuple[str, ...] | None = None
+    scopes: Sequence[str]
+    cameras: Sequence[str] | None = None
+    sources: Sequence[str] | None = None
     expires_at: datetime | None = None
 
 

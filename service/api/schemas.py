@@ -146,7 +146,7 @@ class IntrinsicsBody(Body):
 
     def to_value(self) -> Intrinsics:
         """The lens as a value."""
-        return Intrinsics(**{**self.model_dump(), "distortion": tuple(self.distortion)})
+        return Intrinsics(**self.model_dump())
 
 
 class FisheyeBody(Body):

@@ -71,13 +71,7 @@ router = APIRouter(prefix="/tokens", tags=["access"])
 @router.post("", status_code=201)
 def create(body: TokenBody, session: WriteDep, response: Response) -> TokenMade:
     """Make a token. It is in this answer and in no other."""
-    spec = TokenSpec(
-        name=body.name,
-        scopes=tuple(body.scopes),
-        cameras=None if body.cameras is None else tuple(body.cameras),
-        sources=None if body.sources is None else tuple(body.sources),
-        expires_at=body.expires_at,
-    )
+    spec = TokenSpec(**body.model_dump())
     made = tokens.make_token(session, spec, name_in(session, None))
     response.headers["Location"] = "/tokens"
     response.headers["Cache-Control"] = "no-store"

@@ -155,17 +155,8 @@ def create(
     body: CheckedBody, state: StateDep, session: WriteDep, response: Response
 ) -> WebhookMade:
     """Create a webhook. Its secret is in this answer and in no other."""
-    made = webhooks.create_webhook(
-        session,
-        state.settings,
-        WebhookSpec(
-            url=body.url,
-            name=body.name,
-            kinds=None if body.kinds is None else tuple(body.kinds),
-            format=body.format,
-            enabled=body.enabled,
-        ),
-    )
+    spec = WebhookSpec(**body.model_dump())
+    made = webhooks.create_webhook(session, state.settings, spec)
     response.headers["Location"] = f"/webhooks/{made.record.id}"
     return WebhookMade.from_record(made.record, pending=0, secret=made.secret)
 

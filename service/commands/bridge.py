@@ -1,13 +1,13 @@
 """`surefoot bridge`: between an MQTT broker and a running service."""
 
 import signal
-import sys
 import threading
 from importlib.metadata import version
 
 from service.data_dir import BRIDGE, StartError, make_private
 from service.setting_values import read_camera_names
 from service.settings import Settings
+from service.workers.processes.process import at_end_of_stdin
 from surefoot.bridge.broker import Address
 from surefoot.bridge.feeds import Topics, read_feeds
 from surefoot.bridge.run import Bridge
@@ -35,7 +35,7 @@ def run_bridge(
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())
     if follow_stdin:
-        threading.Thread(target=_follow_stdin, args=(stopping,), daemon=True).start()
+        at_end_of_stdin(stopping.set)
     address = Address(
         url=settings.mqtt_url,
         client_id=settings.mqtt_client_id,
@@ -64,8 +64,3 @@ def run_bridge(
         discovery=settings.mqtt_discovery or None,
         version=version("surefoot"),
     ).run(stopping)
-
-
-def _follow_stdin(stopping: threading.Event) -> None:
-    sys.stdin.buffer.read()
-    stopping.set()

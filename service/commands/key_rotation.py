@@ -19,10 +19,8 @@ from service.store.engines.store import Store
 def rotate_key(settings: Settings, old_key_file: Path | None, *, lost: bool = False) -> int:
     """Seal by SUREFOOT_SECRET_KEY, or by a key file that is made anew; returns how many secrets.
 
-    Args:
-        settings: of a data directory that nothing uses.
-        old_key_file: of the key until now; the data directory's own if None.
-        lost: there is none; webhooks get new secrets and are disabled.
+    Nothing may use the data directory, whose own key file is the old one if none is named. Where it
+    is `lost`, webhooks get new secrets and are disabled.
 
     Raises:
         StartError: something uses it, or the old key does not open what is stored.

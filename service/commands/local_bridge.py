@@ -4,18 +4,14 @@ import logging
 import subprocess
 import sys
 import threading
-import time
 from typing import Self
 
 from service.settings import Settings
 from service.workers.processes import exits
-from service.workers.processes.local_workers import pause_s
+from service.workers.processes.children import TICK_S, ended, keep_alive
 
 log = logging.getLogger("surefoot.serve")
 
-_STOP_S = 10.0
-_TICK_S = 0.2
-_SETTLED_S = 60.0  # who lives for so long did not die of how it starts
 TOKEN_VARIABLE = "SUREFOOT_TOKEN"
 _ANY = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 
@@ -34,7 +30,8 @@ class LocalBridge:
         if token is not None:  # no flag: every user of a machine sees the words of its commands
             self._environment[TOKEN_VARIABLE] = token
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._keep, daemon=True)
+        parts = (self._run, self._tell, self._stopping)
+        self._thread = threading.Thread(target=keep_alive, args=parts, daemon=True)
 
     def __enter__(self) -> Self:
         if self._settings.mqtt_url is not None:
@@ -46,20 +43,12 @@ class LocalBridge:
         if self._thread.is_alive():
             self._thread.join()
 
-    def _keep(self) -> None:
-        deaths = 0
-        while not self._stopping.is_set():
-            begun_s = time.monotonic()
-            status = self._run()
-            if self._stopping.is_set():
-                return
-            deaths = 1 if time.monotonic() - begun_s > _SETTLED_S else deaths + 1
-            rest_s = pause_s(deaths)
-            fields = {"status": status, "why": exits.words_of(status), "again_in_s": rest_s}
-            log.error("bridge_ended", extra=fields)
-            self._stopping.wait(rest_s)
+    def _tell(self, status: int, _: int, rest_s: float) -> bool:
+        fields = {"status": status, "why": exits.words_of(status), "again_in_s": rest_s}
+        log.error("bridge_ended", extra=fields)
+        return True
 
-    def _run(self) -> int:
+    def _run(self, _: int) -> int:
         """Run it until it ends or is to end; returns its exit status."""
         command = [sys.executable, "-m", "service.cli", "bridge", "--url", self._url]
         with subprocess.Popen(
@@ -67,12 +56,6 @@ class LocalBridge:
             stdin=subprocess.PIPE,
             env=self._environment,
         ) as process:
-            while process.poll() is None and not self._stopping.wait(_TICK_S):
+            while process.poll() is None and not self._stopping.wait(TICK_S):
                 pass
-            if process.poll() is None:
-                process.terminate()
-                try:
-                    process.wait(_STOP_S)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-            return process.wait()
+            return ended(process)

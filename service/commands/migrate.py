@@ -97,9 +97,7 @@ def _migrate_tables(settings: Settings) -> None:
 def _copy_before(database: Path, revision: str) -> Path:
     """Copy a database beside it, and delete copies but the newest two; returns the copy.
 
-    Args:
-        database: nobody else writes its schema meanwhile.
-        revision: what it is about to be brought to, for the name.
+    The copy is named by the revision that it is to be brought to.
 
     Raises:
         StartError: there is no space for it.

@@ -6,7 +6,6 @@ import os
 import signal
 import socket
 import sys
-import threading
 import time
 from datetime import UTC, datetime
 from functools import partial
@@ -28,7 +27,7 @@ from service.store.engines.store import Store
 from service.workers.processes import exits
 from service.workers.processes.collector import importing, settle_collector
 from service.workers.processes.local_workers import LocalWorkers
-from service.workers.processes.process import settle_allocator
+from service.workers.processes.process import at_end_of_stdin, settle_allocator
 
 log = logging.getLogger("surefoot.serve")
 
@@ -45,7 +44,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
         StartError: what keeps it from serving, in one line.
     """
     if follow_stdin:
-        threading.Thread(target=_stop_at_end_of_stdin, daemon=True).start()
+        at_end_of_stdin(_stop)
     make_private(settings.data_dir)
     settle_allocator()
     with held_alone(settings.data_dir), contextlib.closing(listen(settings)) as listener:
@@ -151,8 +150,7 @@ def listen(settings: Settings) -> socket.socket:
         ) from error
 
 
-def _stop_at_end_of_stdin() -> None:
-    sys.stdin.buffer.read()
+def _stop() -> None:
     while True:
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(1.0)

@@ -3,8 +3,6 @@
 import logging
 import os
 import signal
-import sys
-import threading
 import time
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -20,6 +18,7 @@ from service.workers.heartbeat import BEAT_S, start_heartbeat
 from service.workers.processes import exits
 from service.workers.processes.process import (
     WorkKind,
+    at_end_of_stdin,
     give_back,
     limit_memory,
     resident_mb,
@@ -81,7 +80,7 @@ def run_worker(
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: context.stopping.set())
     if follow_stdin:
-        threading.Thread(target=_stop_at_end_of_stdin, args=(context,), daemon=True).start()
+        at_end_of_stdin(context.stopping.set)
     start_heartbeat(context, tells=follow_stdin)
     follow_clock_since_last_run(context)
     with store.write(WORKERS) as session:
@@ -142,9 +141,3 @@ def _is_full(context: JobContext) -> bool:
         return False
     give_back()
     return resident_mb() > limit_mb
-
-
-def _stop_at_end_of_stdin(context: JobContext) -> None:
-    """`serve` holds the other end: when it dies in whatever way, its workers end too."""
-    sys.stdin.buffer.read()
-    context.stopping.set()

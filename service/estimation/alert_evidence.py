@@ -10,40 +10,50 @@ from models.geometry.pose import FIELDS, PARAMETERS, CameraPose, PoseParameters,
 from models.geometry.rotation import Array
 from models.pose import PEOPLE, Hypothesis, PosePosterior
 from service.estimation.finding import Finding
+from service.estimation.moved_zones import MovedZones
 
 _HYPOTHESES = 8
 
 
 def alert_evidence(finding: Finding, prior: CameraPose) -> dict[str, Any]:
     """All that the verdict on a finding hangs on; angles in radians."""
-    fused, joint, chart, creep = finding.fused, finding.joint, finding.reading, finding.creep
+    fused, chart, creep = finding.fused, finding.reading, finding.creep
     return {
+        **told_by(finding.posterior, fused.values - array_of(prior), finding.zones),
         "tracks": len(finding.tracks),
-        "walking_groups": joint.walking_groups,
+        "walking_groups": finding.joint.walking_groups,
         "from_s": finding.tracks[0].started_s,
         "to_s": finding.tracks[-1].ended_s,
-        "moved": finding.posterior.moved,
-        "hypotheses": hypotheses_of(finding.posterior, prior),
-        "offset": offset_of(fused.values - array_of(prior), prior),
         "offset_sd": asdict(PoseParameters.sd_of_array(fused.covariance, prior.height_m)),
         "registered": fused.registered,
         "prior_loss_sd": fused.prior_loss,
         "rivals": rivals_of(finding),
-        "chart": None
-        if chart is None
-        else {
-            "statistic": chart.statistic,
-            "level": chart.level,
-            "walking_groups": chart.walking_groups,
-        },
-        "creep": None if creep is None else {"statistic": creep.statistic, "level": creep.level},
-        "zones": None if finding.zones is None else asdict(finding.zones),
+        "chart": _picked(chart, "statistic", "level", "walking_groups"),
+        "creep": _picked(creep, "statistic", "level"),
     }
 
 
-def hypotheses_of(posterior: PosePosterior, prior: CameraPose) -> list[dict[str, Any]]:
-    """The likeliest hypotheses of what moved, with their weights."""
-    return [_hypothesis(each, prior) for each in posterior.likeliest(_HYPOTHESES)]
+def told_by(posterior: PosePosterior, offset: Array, zones: MovedZones | None) -> dict[str, Any]:
+    """What any witness tells, of an `offset` (4,) from the prior pose; of people, nothing yet."""
+    prior = posterior.prior
+    likeliest = posterior.likeliest(_HYPOTHESES)
+    return {
+        "tracks": 0,
+        "walking_groups": 0,
+        "moved": posterior.moved,
+        "hypotheses": [_hypothesis(each, prior) for each in likeliest],
+        "offset": _named(offset, prior),
+        "registered": False,
+        "prior_loss_sd": 0.0,
+        "rivals": [],
+        "chart": None,
+        "creep": None,
+        "zones": None if zones is None else asdict(zones),
+    }
+
+
+def _picked(result: object | None, *names: str) -> dict[str, Any] | None:
+    return None if result is None else {name: getattr(result, name) for name in names}
 
 
 def rivals_of(finding: Finding) -> list[dict[str, Any]]:
@@ -70,11 +80,11 @@ def _hypothesis(each: Hypothesis, prior: CameraPose) -> dict[str, Any]:
         "moved": list(each.moved),
         "far": each.far,
         "weight": each.weight,
-        "offset": offset_of(each.offset, prior),
+        "offset": _named(each.offset, prior),
     }
 
 
-def offset_of(offset: Array, prior: CameraPose) -> dict[str, float]:
+def _named(offset: Array, prior: CameraPose) -> dict[str, float]:
     """An offset (4,) of tilt, roll, log height, heading, named; within half a turn."""
     tilt, roll, log_height, heading = offset.tolist()
     return {

@@ -31,7 +31,7 @@ from service.references import window_of
 from service.settings import Settings
 from service.store import cameras, references, windows
 from service.store.cameras import CameraRecord
-from service.store.references import AnchorRecord
+from service.store.references import AnchorRecord, FlowMapRecord
 
 _MOST_A_DAY = 100
 
@@ -69,28 +69,23 @@ class AnchorDays:
     to_s: float
 
 
-def keep_anchor(
+def keep_paths(
     session: Session,
     reference_id: int,
     paths: LearnedPaths | None,
     *,
+    tracks: int,
+    weight: float,
     to_s: float,
     learned_at: datetime,
+    anchored: bool,
 ) -> None:
-    """Make a map and its chart the anchor of a reference; nothing where there is no chart."""
-    if paths is None or paths.chart is None:
-        return
-    session.merge(
-        AnchorRecord(
-            reference_id=reference_id,
-            flow=paths.flow,
-            chart=paths.chart,
-            to_s=to_s,
-            learned_at=learned_at,
-            creep=None,
-            logged_to_s=None,
-        )
-    )
+    """Make a map and its chart those of a reference; and its anchor, where there is a chart."""
+    made = {"reference_id": reference_id, "to_s": to_s, "learned_at": learned_at}
+    flow, chart = (None, None) if paths is None else (paths.flow, paths.chart)
+    session.merge(FlowMapRecord(**made, data=flow, chart=chart, tracks=tracks, weight=weight))
+    if anchored and chart is not None:
+        session.merge(AnchorRecord(**made, flow=flow, chart=chart, creep=None, logged_to_s=None))
 
 
 def load_anchor_days(

@@ -1,36 +1,23 @@
-"""Judge what the tracks of a window come to: a stored estimate, its alerts and its training."""
+"""What comes of a finding, in one transaction: an estimate, its alerts, training and event."""
 
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy.orm import Session
 
-from models.durations import DAY_S
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
-from models.monitoring.verdict import (
-    LIKELY,
-    Drift,
-    DriftVerdict,
-    charted_clock,
-    clock_fault,
-    judge,
-    may_be_clock,
-    pose_after,
-    reason_of_chart,
-    reason_of_creep,
-    reason_of_drift,
-)
-from models.pose import PosePosterior, WindowState, drift_of, is_site_changed, state_of
+from models.monitoring.verdict import Drift, pose_after
+from models.pose import PosePosterior, drift_of
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
-from service.enums import AlertKind, Answer, EventType, Outcome, PoseState, Severity
+from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
 from service.estimation.alert_evidence import alert_evidence, rivals_of, would_notice
-from service.estimation.evidence import Evidence, SeenTrack
+from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
+from service.estimation.judgement import Case, History, Judgement
 from service.job_queue import JobQueue
-from service.reasons import Reasons, ServiceCode, some
+from service.reasons import ServiceCode
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
 from service.store import estimates, journal, pictures, references
@@ -40,44 +27,12 @@ from service.store.estimates import EstimateRecord, identifiable_drift
 from service.store.references import LastPoseRecord, SiteReferenceRecord
 from service.training import train_at_edge
 from service.wording.alerts import fired_as
-from service.wording.times import from_seconds
-
-_UNJUDGED = DriftVerdict(streak=0, excess=0.0, drifted=())
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class History:
-    """Earlier findings of a camera.
-
-    `last` is the newest estimate against its reference, `drifted` what had drifted as long as an
-    alert says so; `unsure`, as long as an alert says that nobody walks on the paths.
-    """
-
-    last: EstimateRecord | None
-    drifted: tuple[str, ...]
-    unsure: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
-    """A camera's state by a finding, and `since` when, where it has moved.
-
-    `after` is when it last stood where it should, as far as is known. `clock` is why its clock or
-    frame rate looks wrong.
-    """
-
-    state: PoseState
-    reasons: Reasons
-    verdict: DriftVerdict = _UNJUDGED
-    after: datetime | None = None
-    since: datetime | None = None
-    clock: Reason | None = None
 
 
 def save_estimate(
     session: Session, queue: JobQueue, settings: Settings, evidence: Evidence, finding: Finding
 ) -> EstimateRecord | None:
-    """Judge the drift of a finding and store it; None if its reference no longer counts.
+    """Judge a finding and store what comes of it; None if its reference no longer counts.
 
     A reference that has become ready, or another one that has begun, has a job of its own. So has
     what comes after a person has answered or was at the camera.
@@ -88,20 +43,19 @@ def save_estimate(
         return None
     drift = drift_of(finding.posterior, finding.fused)
     if evidence.site is None:
-        learning = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
-        judgement = Judgement(state=PoseState.LEARNING, reasons=learning)
-        record = _record(reference, evidence, finding, drift, judgement)
-        record.identifiable, record.pose = [], PoseParameters.of_pose(evidence.prior)
-        record.moved, record.moved_parameters = settings.moved_prior, {}
+        record = _learning(settings, reference, evidence, finding, drift)
     else:
-        if finding.change is not None:
-            reference.window_from_s = finding.change.ended_s
-            reference.changed_after_s, reference.changed_s = _change_of(evidence, finding.change)
+        _note_change(reference, evidence, finding)
         history = history_of(session, reference)
-        picture = finding.picture
-        if finding.people_moved is not None and picture and not picture.was_told(history.last):
-            pictures.note_agreement(session, camera.id, people_moved=finding.people_moved)
-        judgement = _judge(reference, history, evidence, finding, drift, camera.frame_rate_hz)
+        _note_agreement(session, history, finding, camera.id)
+        judgement = Case(
+            reference=reference,
+            history=history,
+            evidence=evidence,
+            finding=finding,
+            drift=drift,
+            frame_rate_hz=camera.frame_rate_hz,
+        ).judged()
         record = _record(reference, evidence, finding, drift, judgement)
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
@@ -109,22 +63,8 @@ def save_estimate(
         update_alerts(session, settings, camera.id, drift, judgement, kept)
     session.add(record)
     tell_estimate(session, record, drift)
-    if finding.last is not None:
-        session.merge(finding.last)
-    elif (last := session.get(LastPoseRecord, reference.id)) is not None:
-        session.delete(last)
+    _keep_last_pose(session, reference.id, finding.last)
     return record
-
-
-def tell_estimate(session: Session, record: EstimateRecord, drift: Drift) -> None:
-    """Add the event of an estimate that was stored."""
-    payload = {
-        "camera_id": record.camera_id,
-        "state": record.state,
-        "tracks": record.tracks,
-        "drift": in_degrees(identifiable_drift(drift)) if record.identifiable else None,
-    }
-    journal.add_event(session, EventType.POSE, payload, record.created_at)
 
 
 def _counting_reference(
@@ -140,6 +80,57 @@ def _counting_reference(
     if evidence.site is not None and is_before(evidence.tracks[-1].ended_s, bounds):
         return None
     return reference
+
+
+def _learning(
+    settings: Settings,
+    reference: SiteReferenceRecord,
+    evidence: Evidence,
+    finding: Finding,
+    drift: Drift,
+) -> EstimateRecord:
+    """The record while a reference is learned: the prior pose is served, and nothing is judged."""
+    learning = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
+    judgement = Judgement(state=PoseState.LEARNING, reasons=learning)
+    record = _record(reference, evidence, finding, drift, judgement)
+    record.identifiable, record.pose = [], PoseParameters.of_pose(evidence.prior)
+    record.moved, record.moved_parameters = settings.moved_prior, {}
+    return record
+
+
+def _note_change(reference: SiteReferenceRecord, evidence: Evidence, finding: Finding) -> None:
+    """Have the window begin at a change that was found, between two tracks."""
+    change = finding.change
+    if change is not None:
+        at = evidence.tracks.index(change)
+        reference.window_from_s, reference.changed_s = change.ended_s, change.started_s
+        reference.changed_after_s = evidence.tracks[at - 1].ended_s if at else None
+
+
+def _note_agreement(session: Session, history: History, finding: Finding, camera_id: str) -> None:
+    """Count, once a picture, how people compare with it."""
+    picture, people_moved = finding.picture, finding.people_moved
+    if people_moved is not None and picture and not picture.was_told(history.last):
+        pictures.note_agreement(session, camera_id, people_moved=people_moved)
+
+
+def _keep_last_pose(session: Session, reference_id: int, found: LastPoseRecord | None) -> None:
+    """Keep where the next estimate may begin."""
+    if found is not None:
+        session.merge(found)
+    elif (last := session.get(LastPoseRecord, reference_id)) is not None:
+        session.delete(last)
+
+
+def tell_estimate(session: Session, record: EstimateRecord, drift: Drift) -> None:
+    """Add the event of an estimate that was stored."""
+    payload = {
+        "camera_id": record.camera_id,
+        "state": record.state,
+        "tracks": record.tracks,
+        "drift": in_degrees(identifiable_drift(drift)) if record.identifiable else None,
+    }
+    journal.add_event(session, EventType.POSE, payload, record.created_at)
 
 
 def history_of(session: Session, reference: SiteReferenceRecord) -> History:
@@ -158,128 +149,6 @@ def history_of(session: Session, reference: SiteReferenceRecord) -> History:
     return History(last=last, drifted=drifted or PLANE_PARAMETERS, unsure=unsure)
 
 
-def _judge(
-    reference: SiteReferenceRecord,
-    history: History,
-    evidence: Evidence,
-    finding: Finding,
-    drift: Drift,
-    frame_rate_hz: float | None,
-) -> Judgement:
-    """The judgement of an estimate after its reference."""
-    clock = clock_fault(drift, finding.posterior.turned, evidence.prior, frame_rate_hz)
-    gone = finding.fused.paths_changed
-    reading, creep = finding.reading, finding.creep
-    if reading is not None and clock is None and not history.drifted and may_be_clock(reading):
-        reading = None
-    enough = finding.enough or finding.posterior.pictured
-    if finding.posterior.pictured and drift.move.moved < LIKELY:
-        reading = None  # people walk otherwise, before a camera that stands
-    verdict = judge(drift, evidence.limits, history.drifted, reading, creep, enough=enough)
-    otherwise = is_site_changed(finding.posterior, finding.fused) and not verdict.drifting
-    reasons = some(
-        Reason(code=ServiceCode.SITE_CHANGED) if otherwise else None,
-        finding.fused.reason if gone else None,
-        None if creep is None else reason_of_creep(creep),
-        reason_of_drift(drift, verdict, evidence.limits),
-        finding.picture.reason if finding.picture and finding.posterior.pictured else None,
-        clock,
-        None if finding.reading is None else reason_of_chart(finding.reading),
-        None if gone else finding.fused.reason,
-        None if set(PLANE_PARAMETERS) <= set(drift.identifiable) else finding.joint.reason,
-        *reference.doubts,
-        finding.pieces,
-        *finding.failures,
-    )
-    if clock is None and reading is not None and verdict.alarmed:
-        clock = charted_clock(reading, finding.posterior.turned)
-    state = _state(reference, history, verdict, evidence, finding)
-    after, since = _since(reference, history, verdict, evidence, finding, state)
-    return Judgement(
-        state=state,
-        reasons=reasons,
-        verdict=verdict,
-        after=after,
-        since=since,
-        clock=clock,
-    )
-
-
-def _state(
-    reference: SiteReferenceRecord,
-    history: History,
-    verdict: DriftVerdict,
-    evidence: Evidence,
-    finding: Finding,
-) -> PoseState:
-    """The state of a camera.
-
-    Of fewer people than `enough`, nothing is said against what somebody said. That people walk on
-    none of the paths is so until some are found to walk there again.
-    """
-    mapped = evidence.flow is not None
-    found = state_of(finding.posterior, finding.fused, drifting=verdict.drifting, mapped=mapped)
-    # People walk elsewhere before a camera that stands: the reasons say so.
-    state = PoseState.OK if found is WindowState.SITE_CHANGED else PoseState(found)
-    if finding.posterior.pictured:
-        return state
-    fits = finding.enough and (finding.fused.registered or not mapped)
-    if history.unsure and not fits and state != PoseState.DRIFTING:
-        return PoseState.UNSURE
-    if finding.enough or state in (PoseState.DRIFTING, PoseState.OK):
-        return state
-    return PoseState.OK if reference.answer == Answer.FALSE_ALARM else PoseState.LEARNING
-
-
-def _change_of(evidence: Evidence, change: SeenTrack) -> tuple[float | None, float]:
-    """The end of the last track before a change and the begin of the first after it."""
-    at = evidence.tracks.index(change)
-    return (evidence.tracks[at - 1].ended_s if at else None), change.started_s
-
-
-def _since(
-    reference: SiteReferenceRecord,
-    history: History,
-    verdict: DriftVerdict,
-    evidence: Evidence,
-    finding: Finding,
-    state: PoseState,
-) -> tuple[datetime | None, datetime | None]:
-    """The times between which the camera moved, or is suspected to, as far as the tracks tell."""
-    last = history.last
-    before = (None, None) if last is None else (last.drift_after, last.drift_since)
-    if verdict.streak <= 0 and state != PoseState.SUSPECTED:
-        return before if verdict.drifting else (None, None)
-    if reference.changed_s is not None:
-        return _between(reference.changed_after_s, reference.changed_s)
-    if before[1] is not None:
-        return before
-    # As was learned; or as somebody said, whose answer has the window begin.
-    stood_s = max(reference.to_s or 0.0, reference.window_from_s or 0.0)
-    reading, creep = finding.reading, finding.creep
-    if reading is not None and reading.moved:
-        at = reading.track_idx
-        ended_s = evidence.tracks[at - 1].ended_s if at else stood_s
-        return _between(ended_s, evidence.tracks[at].started_s)
-    if creep is not None and creep.moved:
-        return None, _at(creep.since_day * DAY_S)
-    # One pose since the reference, and never another one: it had moved before all of them.
-    if last is None:
-        return _between(stood_s, finding.tracks[0].ended_s)
-    return _between(last.to_s, finding.tracks[-1].ended_s)
-
-
-def _between(stood_s: float | None, moved_s: float) -> tuple[datetime | None, datetime | None]:
-    """The times of a move between a person before it and one after it, who may overlap."""
-    if stood_s is None:
-        return None, _at(moved_s)
-    return _at(min(stood_s, moved_s)), _at(max(stood_s, moved_s))
-
-
-def _at(time_s: float | None) -> datetime | None:
-    return None if time_s is None else from_seconds(time_s)
-
-
 def update_alerts(
     session: Session,
     settings: Settings,
@@ -288,45 +157,38 @@ def update_alerts(
     judgement: Judgement,
     evidence: dict[str, Any],
 ) -> None:
-    """Open, update or end the alerts that an estimate stands behind."""
+    """Open, update or end the alerts that an estimate stands behind: one of them fires, or none."""
     firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
-    of_no_move = {**evidence, "zones": None}
-    if not verdict.drifting:
-        unsure = judgement.state == PoseState.UNSURE
-        for kind in firing - {AlertKind.UNSURE} if unsure else firing:
-            end_alert(session, camera_id, kind, Outcome.CLEARED)
-        if unsure:
-            open_alert(
-                session,
-                settings,
-                camera_id,
-                AlertKind.UNSURE,
-                Severity.WARNING,
-                identifiable_drift(drift),
-                None,
-                reasons=judgement.reasons,
-                evidence=of_no_move,
-            )
+    kind, moved = _kind_of(judgement, firing), verdict.drifting
+    note = fired_as(kind) if kind is not None and moved else None
+    for before in firing - {kind}:
+        end_alert(session, camera_id, before, Outcome.CLEARED, note=note)
+    if kind is None or (moved and not drift.identifiable and not verdict.alarmed):
         return
+    clock = judgement.clock if moved else None
+    open_alert(
+        session,
+        settings,
+        camera_id,
+        kind,
+        Severity.CRITICAL if moved and verdict.excess >= 2 else Severity.WARNING,
+        identifiable_drift(drift),
+        judgement.since if moved else None,
+        reasons=judgement.reasons if clock is None else (clock,),
+        changed_after=judgement.after if moved else None,
+        # Zones are told of with a move alone.
+        evidence=evidence if kind is AlertKind.DRIFT else {**evidence, "zones": None},
+    )
+
+
+def _kind_of(judgement: Judgement, firing: set[AlertKind]) -> AlertKind | None:
+    """The kind of the alert that is to fire; None where none is."""
+    verdict = judgement.verdict
+    if not verdict.drifting:
+        return AlertKind.UNSURE if judgement.state == PoseState.UNSURE else None
     # What was named a clock fault stays one until an angle has drifted too.
     still_clock = AlertKind.CLOCK in firing and verdict.drifted == ("height",)
-    clock = judgement.clock is not None or still_clock
-    kind = AlertKind.CLOCK if clock else AlertKind.DRIFT
-    for before in firing - {kind}:
-        end_alert(session, camera_id, before, Outcome.CLEARED, note=fired_as(kind))
-    if drift.identifiable or verdict.alarmed:
-        open_alert(
-            session,
-            settings,
-            camera_id,
-            kind,
-            Severity.CRITICAL if verdict.excess >= 2 else Severity.WARNING,
-            identifiable_drift(drift),
-            judgement.since,
-            reasons=judgement.reasons if judgement.clock is None else (judgement.clock,),
-            changed_after=judgement.after,
-            evidence=of_no_move if clock else evidence,
-        )
+    return AlertKind.CLOCK if judgement.clock is not None or still_clock else AlertKind.DRIFT
 
 
 def _record(

@@ -104,13 +104,8 @@ def until_so_many(
     the same tracks whenever it is asked. Five times as many tracks as people do in any case, and
     of tracks that are nearly all pieces some more than the fewest: each time all are linked anew.
 
-    Args:
-        load: the first so many tracks, or the newest.
-        wanted: people.
-        intrinsics: of the camera.
-        prior: about where it stands.
-        unpacked: what was unpacked already, and will be.
-        newest: whether the newest are loaded, which are the last in order; or the first.
+    `load` gives the first so many tracks, or the `newest`, which are the last in order; `prior` is
+    about where the camera stands.
     """
     limit, most = wanted, MOST_PIECES * wanted
     loaded = limit + max(limit // _SPARE, 1)  # most trackers cut few walks: once is enough

@@ -25,7 +25,7 @@ from models.pose import (
     without_creep,
 )
 from models.tracks.trajectory import Trajectory
-from service.estimation.anchoring import LearnedPaths, keep_anchor, paths_of
+from service.estimation.anchoring import LearnedPaths, keep_paths, paths_of
 from service.estimation.evidence import Anchor, Unpacked, anchor_of
 from service.references import (
     Attendance,
@@ -198,20 +198,18 @@ def save_growth(
         return False
     if learned is None and kept is not None and kept.data is not None and not period.spoilt:
         return False
-    grown = FlowMapRecord(
-        reference_id=reference.id,
-        data=None if learned is None else learned.flow,
-        chart=None if learned is None else learned.chart,
+    anchor = session.get(AnchorRecord, reference.id)
+    keep_paths(
+        session,
+        reference.id,
+        learned,
         tracks=len(period.trajectories),
         weight=float(period.weights.sum()),
         to_s=period.to_s,
         learned_at=period.taken_at,
+        # The first map is kept; or, where tracks of a move are in it, this one in its place.
+        anchored=anchor is None or (period.spoilt and anchor.to_s > (reference.to_s or 0.0)),
     )
-    session.merge(grown)
-    anchor = session.get(AnchorRecord, reference.id)
-    # The first map is kept; or, where tracks of a move are in it, this one in its place.
-    if anchor is None or (period.spoilt and anchor.to_s > (reference.to_s or 0.0)):
-        keep_anchor(session, reference.id, learned, to_s=period.to_s, learned_at=period.taken_at)
     return True
 
 

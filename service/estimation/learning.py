@@ -17,14 +17,13 @@ from models.tracks.trajectory import Trajectory
 from service.access.activity import note
 from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
-from service.estimation.anchoring import keep_anchor, paths_of
+from service.estimation.anchoring import keep_paths, paths_of
 from service.estimation.evidence import Unpacked, until_so_many, walk_of
 from service.reasons import some
 from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
 from service.store import cameras, references, windows
 from service.store.cameras import CameraRecord
-from service.store.references import FlowMapRecord
 
 # What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
 _DOUBT_KINDS: dict[StrEnum, AlertKind] = {
@@ -141,18 +140,16 @@ def save_reference(
     record.ready_at = datetime.now(UTC)
     details = {"tracks": record.tracks, "walking_speed_mps": site.walking_speed_mps}
     note(session, Activity.REFERENCE_LEARNED, by=None, camera_id=camera_id, details=details)
-    session.add(
-        FlowMapRecord(
-            reference_id=record.id,
-            data=None if paths is None else paths.flow,
-            chart=None if paths is None else paths.chart,
-            tracks=record.tracks,
-            weight=float(record.tracks),
-            to_s=period.to_s,
-            learned_at=record.ready_at,
-        )
+    keep_paths(
+        session,
+        record.id,
+        paths,
+        tracks=record.tracks,
+        weight=float(record.tracks),
+        to_s=period.to_s,
+        learned_at=record.ready_at,
+        anchored=True,
     )
-    keep_anchor(session, record.id, paths, to_s=period.to_s, learned_at=record.ready_at)
     if site.implausible is not None:
         _warn(session, settings, camera_id, site.implausible)
 

@@ -1,7 +1,7 @@
 """The consequence of a move for zones: what lies where it was drawn, whom a line misses."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from models.geometry.crossings import Steps, crossings
 from models.geometry.intrinsics import Intrinsics
@@ -25,9 +25,9 @@ class MovedZone:
     on: ZoneOn
     overlap: float
     in_view: float
-    crossed: int | None
-    missed: int | None
-    false_counts: int | None
+    crossed: int | None = None
+    missed: int | None = None
+    false_counts: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,11 +46,7 @@ def moved_zones(
 ) -> MovedZones | None:
     """The consequence of a pose for zones; None where there are none, or they were drawn at it.
 
-    Args:
-        record: of the zones.
-        lens: of the camera now.
-        pose: that it has now.
-        tracks: of people since it has.
+    `tracks` are of people since the camera has this pose.
     """
     now = View(intrinsics=lens, pose=pose)
     if record is None or not record.zones or record.view == now:
@@ -66,9 +62,7 @@ def moved_zones(
                 on=ZoneOn.GROUND if outline.on_ground else ZoneOn.SCENE,
                 overlap=placed.overlap,
                 in_view=placed.in_view,
-                crossed=None if told is None else told.crossed,
-                missed=None if told is None else told.missed,
-                false_counts=None if told is None else told.false_counts,
+                **({} if told is None else asdict(told)),
             )
         )
     return MovedZones(zones=tuple(found), form=record.form)

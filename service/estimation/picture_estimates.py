@@ -12,15 +12,10 @@ from models.monitoring.verdict import LIKELY, judge, pose_after, reason_of_drift
 from models.pose import PosePosterior, posterior_by_picture
 from models.reasons import Reason
 from service.enums import PoseState
-from service.estimation.alert_evidence import hypotheses_of, offset_of
-from service.estimation.estimates import (
-    Judgement,
-    history_of,
-    record_of,
-    tell_estimate,
-    update_alerts,
-)
-from service.estimation.moved_zones import moved_zones
+from service.estimation.alert_evidence import told_by
+from service.estimation.estimates import history_of, record_of, tell_estimate, update_alerts
+from service.estimation.judgement import Judgement
+from service.estimation.moved_zones import MovedZones, moved_zones
 from service.estimation.pictures import drift_by_picture
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.notifications.outbox import json_time
@@ -81,11 +76,10 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
         to_s=picture.taken_s,
         newest_track_pk=tracks.newest_pk(session, camera_id) or 0,
     )
-    evidence = _evidence(posterior, picture)
     lens = session.get_one(CameraRecord, camera_id).intrinsics
     drawn = zones.of_camera(session, camera_id)
     moved = moved_zones(drawn, lens, pose_after(drift, prior)) if verdict.drifting else None
-    evidence["zones"] = None if moved is None else asdict(moved)
+    evidence = _evidence(posterior, picture, moved)
     update_alerts(session, settings, camera_id, drift, judgement, evidence)
     session.add(record)
     tell_estimate(session, record, drift)
@@ -97,25 +91,17 @@ def _stood_at(session: Session, camera_id: str) -> datetime | None:
     return None if found is None else found.other_at
 
 
-def _evidence(posterior: PosePosterior, picture: SeenPicture) -> dict[str, object]:
+def _evidence(
+    posterior: PosePosterior, picture: SeenPicture, moved: MovedZones | None
+) -> dict[str, object]:
     """What an alert is by, as of people; without any."""
     assert picture.evidence is not None
-    prior = posterior.prior
     tilt, roll, heading = picture.evidence.offset.tolist()
     sds = np.sqrt(np.diag(picture.evidence.covariance)).tolist()
     sd = PoseParameters(height_m=math.inf, tilt_rad=sds[0], roll_rad=sds[1], heading_rad=sds[2])
     return {
-        "tracks": 0,
-        "walking_groups": 0,
+        **told_by(posterior, np.array([tilt, roll, 0.0, heading]), moved),
         "from_s": picture.taken_s,
         "to_s": picture.taken_s,
-        "moved": posterior.moved,
-        "hypotheses": hypotheses_of(posterior, prior),
-        "offset": offset_of(np.array([tilt, roll, 0.0, heading]), prior),
         "offset_sd": asdict(sd) | {"height_m": None},
-        "registered": False,
-        "prior_loss_sd": 0.0,
-        "rivals": [],
-        "chart": None,
-        "creep": None,
     }

@@ -58,10 +58,7 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
 
     `size` and `normalised` in it are of every track that does not say its own.
 
-    Args:
-        body: the request's body.
-        clock: what to use where the body does not say it.
-        limits: what tracks have to keep to.
+    `clock` is of what the body does not say.
 
     Raises:
         MalformedError: the body is no such object. One bad track is no reason.

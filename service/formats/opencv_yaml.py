@@ -17,11 +17,7 @@ def opencv_yaml(
     `P` is K [R | t]. A homography knows no distortion: `H_image_from_ground` takes (x, y, 1) in
     metres to undistorted pixels, `H_ground_from_image` takes those back.
 
-    Args:
-        intrinsics: the lens.
-        pose: where it stands.
-        camera_id: name of the camera, a slug.
-        words: comments for the head of the file; line breaks in them are taken out.
+    `words` are comments for the head of the file; line breaks in them are taken out.
     """
     rotation, translation = pose.rotation, pose.translation_m[:, None]
     projection = intrinsics.matrix @ np.hstack([rotation, translation])

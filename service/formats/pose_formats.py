@@ -61,14 +61,8 @@ def pose_file(
 ) -> PoseFile:
     """The pose of a camera in a format.
 
-    Args:
-        kind: the format.
-        intrinsics: the lens.
-        pose: where it stands.
-        camera_id: name of the camera, a slug.
-        at: time that the pose is of; None of a prior pose.
-        words: comments, where the format has such.
-        origin: of the world on the earth, for GeoJSON.
+    `at` is the time that the pose is of, None of a prior pose; `words` are comments, where the
+    format has such.
 
     Raises:
         MalformedError: the camera is too far from the origin.

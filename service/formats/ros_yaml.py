@@ -31,12 +31,9 @@ def ros_yaml(
     The lens comes first since ROS' own reader takes the first document alone. A PoseStamped says
     where the frame stands in the world: the centre, and the inverse of `camera_from_world`.
 
-    Args:
-        intrinsics: the lens.
-        pose: where it stands.
-        camera_id: a slug; ROS takes no hyphens in a name, so that they become underscores.
-        at: time that the pose is of; 0, ROS' word for unknown, where it is the prior pose.
-        words: comments for the head of the file; line breaks in them are taken out.
+    ROS takes no hyphens in a name, so that those of the id become underscores. `at` is the time
+    that the pose is of; 0, ROS' word for unknown, where it is the prior pose. `words` are comments
+    for the head of the file; line breaks in them are taken out.
     """
     w, x, y, z = pose.quaternion_wxyz
     since = timedelta() if at is None else at - datetime(1970, 1, 1, tzinfo=UTC)

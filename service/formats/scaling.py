@@ -35,10 +35,8 @@ class Scaling:
 def read_scaling(size: Any, normalised: Any, picture: tuple[int, int]) -> Scaling | None:
     """How numbers come into a camera's picture (width, height); None where they are of it.
 
-    Args:
-        size: [width, height] of the picture that they are of, or None.
-        normalised: true where they are shares of the picture, 0 to 1; `size` then says nothing.
-        picture: the camera's own.
+    They are of a picture of `size` [width, height], or shares of one, 0 to 1, where `normalised`:
+    `size` then says nothing.
 
     Raises:
         ValueError: with the field, what is needed and what came.

@@ -162,14 +162,9 @@ def write_zones(
 ) -> str:
     """The text of a document with zones where they are now; what is not a zone stays as it is.
 
-    Args:
-        kind: its format.
-        document: as it came, if it came in this format; else None.
-        camera_id: of the camera.
-        picture: width and height of its picture.
-        zones: as they were drawn.
-        moved: by their ids, the corners that they have by now, in pixels: without any, a zone is
-            left out. None where nothing has moved: the document is as it came.
+    `document` is as it came, if it came in this format. `moved` has, by their ids, the corners that
+    zones have by now, in pixels: without any, a zone is left out. None where nothing has moved: the
+    document is as it came.
     """
     form = _FORMS[kind]
     made = copy.deepcopy(form.template(zones) if document is None else document)

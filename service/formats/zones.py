@@ -52,11 +52,7 @@ def zones_of(
 ) -> tuple[Zone, ...]:
     """The zones of a document.
 
-    Args:
-        slots: of the document.
-        on: what those lie on of which it does not say so.
-        to_pixel: from its numbers.
-        picture: the width and height of the camera's picture.
+    They lie `on` what is named where it does not say.
 
     Raises:
         MalformedError: with the place, the limit and what came.

@@ -32,7 +32,7 @@ class WebhookSpec:
 
     url: str
     name: str
-    kinds: tuple[AlertKind, ...] | None
+    kinds: Sequence[AlertKind] | None
     format: WebhookFormat
     enabled: bool
 

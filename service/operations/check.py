@@ -2,14 +2,12 @@
 
 import shutil
 import stat
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from models.durations import HOUR_S
-from models.regression.recipe import weights_path
+from models.regression.recipe import unused_weights, weights_path
 from service.data_dir import (
     StartError,
     held_alone,
@@ -119,12 +117,7 @@ def _weights(settings: Settings) -> Iterator[Finding]:
         [f"model {model_id} has none or broken ones" for model_id in broken],
         f"{len(named)} models, each has its weights",
     )
-    hour_ago = time.time() - HOUR_S
-    unused = [
-        path.name
-        for path in (settings.weights_dir.glob("*") if settings.weights_dir.exists() else ())
-        if path.name.split(".")[0] not in named.values() and path.stat().st_mtime < hour_ago
-    ]
+    unused = unused_weights(settings.weights_dir, named.values())
     detail = f"{len(unused)} files that no model names; retention deletes them"
     yield _noted("unused weights", detail if unused else "", "none")
 

@@ -58,7 +58,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         return _unwritable(error)
     free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
     # A heartbeat of the future is one of before the clock was set back: no sign of life either.
-    heartbeat = max((each.heartbeat_at for each in known if not each.lost), default=None)
+    heartbeat = workers.last_heard(known)
     silent_s = None if heartbeat is None else abs((asked - heartbeat).total_seconds())
     alive = silent_s is not None and silent_s < settings.worker_lost_s
     # Who fails is named below, and rests between its tries: it does not hold up the queue.

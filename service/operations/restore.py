@@ -57,13 +57,9 @@ class Restored:
 def restore_backup(
     settings: Settings, archive: Path, on_progress: Progress, *, force: bool
 ) -> Restored:
-    """Verify an archive, then put it into the data directory.
+    """Verify an archive, then put it into the data directory, which nothing may use.
 
-    Args:
-        settings: of the data directory; nothing may use it.
-        archive: made by `write_backup`.
-        on_progress: called with what is done, how far it is, and how much there is.
-        force: move aside what is there; else only an empty folder is taken.
+    With `force` what is there is moved aside; else only an empty folder is taken.
 
     Raises:
         StartError: the archive is damaged or of a later release, the folder is in use or not

@@ -33,7 +33,7 @@ def find_troubles(session: Session, settings: Settings) -> list[Trouble]:
 
 def _of_workers(session: Session, settings: Settings) -> list[Trouble]:
     known = workers.every(session)
-    heard = max((each.heartbeat_at for each in known if not each.lost), default=None)
+    heard = workers.last_heard(known)
     found = [
         Trouble(words=f"The worker {each.name} {each.trouble}", since=each.heartbeat_at)
         for each in known

@@ -91,16 +91,7 @@ class CameraRecord(Record):
     @property
     def intrinsics(self) -> Intrinsics:
         """The lens."""
-        return Intrinsics(
-            width=self.width,
-            height=self.height,
-            fx=self.fx,
-            fy=self.fy,
-            cx=self.cx,
-            cy=self.cy,
-            distortion=tuple(self.distortion),
-            projection=self.projection,
-        )
+        return Intrinsics(**{each.name: getattr(self, each.name) for each in fields(Intrinsics)})
 
 
 _ORIGINS = (
@@ -141,14 +132,7 @@ class PriorPoseRecord(Record):
     @property
     def pose(self) -> CameraPose:
         """As a value."""
-        return CameraPose(
-            height_m=self.height_m,
-            tilt_rad=self.tilt_rad,
-            roll_rad=self.roll_rad,
-            heading_rad=self.heading_rad,
-            x_m=self.x_m,
-            y_m=self.y_m,
-        )
+        return CameraPose(**{each.name: getattr(self, each.name) for each in fields(CameraPose)})
 
     @property
     def assumed(self) -> bool:
@@ -268,7 +252,7 @@ def awaited(connection: Connection, camera_id: str) -> Awaited | None:
 def _lens(connection: Connection, camera_id: str) -> Intrinsics:
     columns = (getattr(CameraRecord, each.name) for each in fields(Intrinsics))
     row = connection.execute(select(*columns).where(CameraRecord.id == camera_id)).one()
-    return Intrinsics(**{**row._mapping, "distortion": tuple(row.distortion)})
+    return Intrinsics(**row._mapping)
 
 
 def as_set_up(

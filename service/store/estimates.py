@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import JSON, ColumnElement, Index, bindparam, delete, func, select
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
-from models.geometry.pose import PoseParameters
+from models.geometry.pose import FIELDS, PoseParameters
 from models.monitoring.verdict import Drift, MoveProbabilities
 from service.enums import PoseState
 from service.reasons import Reasons
@@ -48,7 +48,7 @@ class EstimateRecord(Record):
     `pose` is the served one: the prior's where the tracks leave it open. `drift_by` and `pose_sd`
     are the estimator's for all four parameters; `identifiable` names those that count.
     `raw` has each estimator's own answer. `model_id` is of the averaged estimate beside the served
-    one. Estimates of before there were flow maps have no `heading_sd_rad`.
+    one.
     """
 
     __tablename__ = "estimates"
@@ -159,12 +159,8 @@ def of_drift(
 
     The newest of those whose people had begun to come by then, and if none had, the first.
 
-    Args:
-        session: of a store.
-        camera_id: of the camera.
-        moved_s: when the drift began, in the time of tracks, where that is known.
-        until: when the drift was over; None while it lasts.
-        at_s: the time.
+    The drift began at `moved_s` of the tracks' time, where that is known, and was over at `until`,
+    None while it lasts.
     """
     conditions = [
         EstimateRecord.camera_id == camera_id,
@@ -235,12 +231,8 @@ def identifiable_sd(drift: Drift) -> dict[str, float | None]:
 def _where_identifiable(
     parameters: PoseParameters, identifiable: tuple[str, ...]
 ) -> dict[str, float | None]:
-    return {
-        "height_m": parameters.height_m if "height" in identifiable else None,
-        "tilt_rad": parameters.tilt_rad if "tilt" in identifiable else None,
-        "roll_rad": parameters.roll_rad if "roll" in identifiable else None,
-        "heading_rad": parameters.heading_rad if "heading" in identifiable else None,
-    }
+    names = ("height", "tilt", "roll", "heading")
+    return {FIELDS[n]: parameters.of(n) if n in identifiable else None for n in names}
 
 
 def forget_later(session: Session, camera_id: str, estimate_id: int) -> None:

@@ -155,13 +155,7 @@ def count_where(session: Session, *conditions: ColumnElement[bool]) -> int:
 
 
 def delete_some(session: Session, key: InstrumentedAttribute[Any], some: Select[Any]) -> int:
-    """Delete the rows whose keys a query gives; how many. Where it gives none, nothing is written.
-
-    Args:
-        session: of a store.
-        key: the column of the primary key.
-        some: the query, of some hundreds of keys at most.
-    """
+    """Delete the rows whose keys a query gives; how many. It may give none: nothing is written."""
     keys = session.scalars(some).all()
     if keys:
         session.execute(delete(key.class_).where(key.in_(keys)))

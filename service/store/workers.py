@@ -52,6 +52,11 @@ def every(session: Session) -> Sequence[WorkerRecord]:
     return session.scalars(select(WorkerRecord).order_by(WorkerRecord.name)).all()
 
 
+def last_heard(known: Sequence[WorkerRecord]) -> datetime | None:
+    """When any of the workers that are not lost was heard of last; None where none ever was."""
+    return max((each.heartbeat_at for each in known if not each.lost), default=None)
+
+
 def forget_lost(session: Session, before: datetime) -> None:
     """Delete workers that were lost and not heard of since a time."""
     session.execute(

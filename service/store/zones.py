@@ -40,8 +40,7 @@ class ZonesRecord(Record):
     @property
     def view(self) -> View:
         """The lens and the pose at which they were drawn."""
-        lens = {**self.intrinsics, "distortion": tuple(self.intrinsics["distortion"])}
-        return View(intrinsics=Intrinsics(**lens), pose=CameraPose(**self.pose))
+        return View(intrinsics=Intrinsics(**self.intrinsics), pose=CameraPose(**self.pose))
 
     @property
     def outlines(self) -> dict[str, Outline]:

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any
 
 from models.errors import CalibrationError
-from models.regression.recipe import TrainingPlan, plan_to_config
+from models.regression.recipe import TrainingPlan, TrainingProgress, plan_to_config
 from service.enums import TrainingState
 from service.settings import Settings
 from service.training import (
@@ -39,16 +39,6 @@ _TRIES = 3  # of processes that die: by a lack of memory, say
 
 class TrainingDiedError(RuntimeError):
     """The process of a training ended without an answer: killed, or out of memory."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
-    """The progress of a training."""
-
-    step: int
-    steps: int
-    loss: float
-    eta_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,11 +137,13 @@ def may_go_on(context: JobContext) -> bool:
         return not context.queue.estimates_wait(session)
 
 
-def _reporter(context: JobContext, attempt: TrainingAttempt) -> Callable[[Progress | None], None]:
+def _reporter(
+    context: JobContext, attempt: TrainingAttempt
+) -> Callable[[TrainingProgress | None], None]:
     """A callback that writes progress and ends a training that is to stop."""
-    written: Progress | None = None
+    written: TrainingProgress | None = None
 
-    def report(progress: Progress | None) -> None:
+    def report(progress: TrainingProgress | None) -> None:
         nonlocal written
         if context.stopping.is_set():
             raise _ParkedError
@@ -173,16 +165,13 @@ def _reporter(context: JobContext, attempt: TrainingAttempt) -> Callable[[Progre
 def train_apart(
     plan: TrainingPlan,
     settings: Settings,
-    on_tick: Callable[[Progress | None], None],
+    on_tick: Callable[[TrainingProgress | None], None],
     may_go_on: Callable[[], bool] = lambda: True,
 ) -> Trained:
     """Train in a process of its own; what `on_tick` raises ends it.
 
-    Args:
-        plan: what to train.
-        settings: where weights go, threads and limit.
-        on_tick: called twice a second with the newest progress, None before there is any.
-        may_go_on: asked as often; while it says no, the training rests between two of its steps.
+    `on_tick` is called twice a second with the newest progress, None before there is any, and
+    `may_go_on` asked as often; while it says no, the training rests between two of its steps.
 
     Raises:
         CalibrationError: the plan cannot be trained, or what came of it is no good.
@@ -195,7 +184,7 @@ def train_apart(
         "nice": settings.training_nice,
     }
     ends_s = time.monotonic() + settings.training_limit_s
-    progress: Progress | None = None
+    progress: TrainingProgress | None = None
     resting = False
     with _process(order, settings) as (process, lines):
         while True:
@@ -207,7 +196,7 @@ def train_apart(
                     raise CalibrationError(line["error"])
                 if "metrics" in line:
                     return Trained(**line)
-                progress = Progress(**line["progress"])
+                progress = TrainingProgress(**line["progress"])
             on_tick(progress)
             if may_go_on() == resting:
                 resting = not resting

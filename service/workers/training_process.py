@@ -44,8 +44,8 @@ def _train(order: dict[str, Any], tells: Any) -> dict[str, Any]:
 
     from models.errors import CalibrationError
     from models.regression.checkpoint import save_weights
-    from models.regression.recipe import plan_from_config
-    from models.regression.training import TrainingProgress, check_held_out, train
+    from models.regression.recipe import TrainingProgress, plan_from_config
+    from models.regression.training import check_held_out, train
 
     told_s = 0.0
 

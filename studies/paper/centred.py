@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from models.regression.training import TrainingProgress
+from models.regression.recipe import TrainingProgress
 from models.tracks.scenes import load_scene
 from studies.paper.centred_run import AveragedRun, run_averaged
 from studies.runs import as_they_end, process_pool, shared_values, write_results

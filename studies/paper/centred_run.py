@@ -19,8 +19,8 @@ from models.geometry.rotation import (
 )
 from models.regression.averaging import PoseEstimate, average_windows, averaged_estimate
 from models.regression.network import predict_windows
-from models.regression.recipe import TrainingPlan, plan_training
-from models.regression.training import TrainingProgress, train
+from models.regression.recipe import TrainingPlan, TrainingProgress, plan_training
+from models.regression.training import train
 from models.simulation.walkers import WalkConfig
 from models.tracks.scenes import Scene
 from models.tracks.trajectory import Trajectory, Windows, choose_step_s, cut_windows

@@ -25,10 +25,8 @@ def read_frame(
     Its time is when the message was made, and unless told otherwise (`msg-conv-frame-interval`) it
     is of every 30th frame: too few for most people.
 
-    Args:
-        message: as it came.
-        camera_of: our name of a sensor; frames of those without one are empty.
-        size: (width, height) of the muxer, which no message says.
+    `camera_of` has our name of a sensor; frames of those without one are empty. No message says the
+    `size` (width, height) of the muxer.
 
     Raises:
         MessageError: it is no such message.

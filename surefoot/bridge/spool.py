@@ -141,9 +141,7 @@ class Spool:
     def next(self, but: Iterable[int], alone: Iterable[int]) -> Group | None:
         """What has waited longest and can go in one post.
 
-        Args:
-            but: numbers that are to be left out for now.
-            alone: numbers of what goes in a post by itself.
+        Numbers in `but` are left out for now, those in `alone` go in a post by themselves.
         """
         left_out, by_itself = set(but), set(alone)
         with self._lock:

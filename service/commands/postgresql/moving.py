@@ -36,10 +36,7 @@ def move(source: Path, settings: Settings, tell: Progress) -> Moved:
     Cut off, or run again, it goes on where it was. What the job engine had queued is queued anew by
     the first worker.
 
-    Args:
-        source: the SQLite file in its data directory, which nothing uses.
-        settings: of the database that it is moved to.
-        tell: called with table, rows done and rows in all.
+    `tell` is called with table, rows done and rows in all.
 
     Raises:
         StartError: the file is in use or of another revision, the database holds another site, or

@@ -1,7 +1,4 @@
-"""SQL that the two databases write differently, each in one place.
-
-SQLite's way is written as it ever was: its statements are not changed by what PostgreSQL needs.
-"""
+"""SQL that the two databases write differently, each in one place."""
 
 from datetime import UTC, datetime
 from typing import Any

@@ -94,9 +94,7 @@ class Prepared:
     Values are converted as SQLAlchemy does, and errors are SQLAlchemy's. Rows come as they are
     stored: columns whose values would have to be converted are not taken.
 
-    Args:
-        statement: what is to be run.
-        columns: those that an insert fills; of any other, none.
+    `columns` are those that an insert fills.
     """
 
     def __init__(self, statement: ClauseElement, columns: Sequence[str] | None = None) -> None:

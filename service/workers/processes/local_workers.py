@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import IO, Self
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -15,21 +16,13 @@ from service.errors import OverloadedError
 from service.settings import Settings
 from service.store.engines.store import Store
 from service.workers.processes import exits
+from service.workers.processes.children import SETTLED_S, TICK_S, ended, keep_alive
 from service.workers.processes.workers import WORKERS, note_trouble, worker_name
 
 log = logging.getLogger("surefoot.serve")
 
-_WORKER_STOP_S = 10.0
-_TICK_S = 0.2
 _START_S = 120.0  # until its first sign of life: on a busy machine its imports take a while
-_SETTLED_S = 60.0  # who lives for so long did not die of how it starts
-_LONGEST_PAUSE_S = 60.0
 _REPORTED_FROM = 3  # deaths in a row
-
-
-def pause_s(deaths: int) -> float:
-    """The pause before a worker is started again that died so often in a row."""
-    return float(min(2.0 ** min(deaths - 1, 20), _LONGEST_PAUSE_S))
 
 
 class LocalWorkers:
@@ -65,31 +58,25 @@ class LocalWorkers:
         self._store.close()
 
     def _keep(self, name: str) -> None:
-        deaths = 0
         self._say(name, None)
-        while not self._stopping.is_set():
-            begun_s = time.monotonic()
-            status = self._run(name, reported=deaths >= _REPORTED_FROM)
-            if self._stopping.is_set():
-                return
-            if status == exits.REFUSED:
-                log.error("worker_refused", extra={"worker": name, "why": exits.words_of(status)})
-                self.refused = True
-                self._give_up()
-                return
-            deaths = 1 if time.monotonic() - begun_s > _SETTLED_S else deaths + 1
-            rest_s = pause_s(deaths)
-            words = exits.words_of(status)
-            fields = {"worker": name, "status": status, "why": words, "again_in_s": rest_s}
-            log.warning("worker_ended", extra=fields)
-            if deaths >= _REPORTED_FROM:
-                self._say(
-                    name, f"died {deaths} times in a row: {words}; started every {rest_s:g} s"
-                )
-            self._stopping.wait(rest_s)
+        keep_alive(partial(self._run, name), partial(self._tell, name), self._stopping)
 
-    def _run(self, name: str, *, reported: bool) -> int:
+    def _tell(self, name: str, status: int, deaths: int, rest_s: float) -> bool:
+        words = exits.words_of(status)
+        if status == exits.REFUSED:
+            log.error("worker_refused", extra={"worker": name, "why": words})
+            self.refused = True
+            self._give_up()
+            return False
+        fields = {"worker": name, "status": status, "why": words, "again_in_s": rest_s}
+        log.warning("worker_ended", extra=fields)
+        if deaths >= _REPORTED_FROM:
+            self._say(name, f"died {deaths} times in a row: {words}; started every {rest_s:g} s")
+        return True
+
+    def _run(self, name: str, deaths: int) -> int:
         """Run a worker until it ends, hangs or is to end; returns its exit status."""
+        reported = deaths >= _REPORTED_FROM
         with subprocess.Popen(
             [sys.executable, "-m", "service.cli", "worker", "--name", name, "--follow-stdin"],
             stdin=subprocess.PIPE,
@@ -98,23 +85,17 @@ class LocalWorkers:
         ) as process:
             beats = _Heartbeat(process.stdout)
             begun_s = time.monotonic()
-            while process.poll() is None and not self._stopping.wait(_TICK_S):
+            while process.poll() is None and not self._stopping.wait(TICK_S):
                 limit_s = self._settings.worker_lost_s if beats.heard else _START_S
                 if beats.silent_s > limit_s:
                     fields = {"worker": name, "pid": process.pid, "silent_s": limit_s}
                     log.error("worker_hangs", extra=fields)
                     process.kill()
                     process.wait()
-                if reported and time.monotonic() - begun_s > _SETTLED_S:
+                if reported and time.monotonic() - begun_s > SETTLED_S:
                     self._say(name, None)
                     reported = False
-            if process.poll() is None:
-                process.terminate()
-                try:
-                    process.wait(_WORKER_STOP_S)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-            return process.wait()
+            return ended(process)
 
     def _say(self, name: str, trouble: str | None) -> None:
         """Have `/readyz` say what is wrong with a worker, or nothing."""

@@ -5,6 +5,9 @@ import logging
 import os
 import resource
 import signal
+import sys
+import threading
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 
@@ -66,9 +69,6 @@ def resident_mb() -> float:
     return pages * _PAGE_MB
 
 
-log = logging.getLogger("surefoot.worker")
-
-
 def yield_to_others(nice: int) -> None:
     """Set this process's niceness, where the system lets it; who started it may be nicer."""
     try:
@@ -86,6 +86,16 @@ def end_like_ctrl_c() -> None:
     """From now on the end of the terminal, or SIGTERM, ends this process as Ctrl-C does."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _interrupt)
+
+
+def at_end_of_stdin(do: Callable[[], object]) -> None:
+    """Do something, in a thread, once stdin ends: who started this process holds the other end."""
+
+    def follow() -> None:
+        sys.stdin.buffer.read()
+        do()
+
+    threading.Thread(target=follow, daemon=True).start()
 
 
 def _interrupt(*_: object) -> None:

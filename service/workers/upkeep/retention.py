@@ -1,15 +1,13 @@
 """Retention: delete what is beyond the limits, a bite at a time, and give the space back."""
 
 import logging
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from models.durations import HOUR_S
+from models.regression.recipe import unused_weights
 from service.settings import Settings
 from service.store import (
     alerts,
@@ -53,7 +51,7 @@ def run_retention(context: JobContext) -> None:
         _apply(context, limit, None)
     # Under the write lock: a model that is published meanwhile waits, and its file is young.
     with context.store.write() as session:
-        for path in _unused_weights(session, settings.weights_dir):
+        for path in unused_weights(settings.weights_dir, trainings.weights_in_use(session)):
             path.unlink(missing_ok=True)
     if settings.database_url is None:  # a server sees to its own disk
         _shrink(context)
@@ -126,14 +124,3 @@ def _shrink(context: JobContext) -> None:
     files.wipe_log(path, patience_ms=200)
     if files.size(path) < before:
         log.info("shrunk", extra={"bytes": files.size(path), "from_bytes": before})
-
-
-def _unused_weights(session: Session, folder: Path) -> list[Path]:
-    """Weight files that no model names and that are not being written now."""
-    used = trainings.weights_in_use(session)
-    written_before_s = time.time() - HOUR_S
-    return [
-        path
-        for path in folder.glob("*")
-        if path.name.split(".")[0] not in used and path.stat().st_mtime < written_before_s
-    ]

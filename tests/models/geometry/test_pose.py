@@ -84,9 +84,9 @@ def test_there_and_back(pose: CameraPose):
         assert back.of(name) == pytest.approx(PoseParameters.of_pose(pose).of(name), rel=1e-12)
 
 
-def test_three_numbers_leave_the_heading_as_it_is_said():
-    found = PoseParameters.of_array(array_of(SOME)[:3], heading_rad=0.7)
-    assert (found.heading_rad, found.tilt_rad) == (0.7, 0.3)
+def test_three_numbers_say_nothing_of_the_heading():
+    found = PoseParameters.of_array(array_of(SOME)[:3])
+    assert (found.heading_rad, found.tilt_rad) == (0.0, 0.3)
 
 
 def test_the_deviation_of_a_log_is_one_of_metres():

@@ -36,7 +36,7 @@ def test_arrays_that_do_not_fit_are_refused():
     found = describe(wall())
     for wrong in (
         {"points_px": found.points_px[:-1]},
-        {"sizes_px": found.sizes_px * np.float32(np.nan)},
+        {"points_px": found.points_px * np.float32(np.nan)},
         {"descriptors": found.descriptors.astype(float)},
         {"width": 0},
         {"analysed": 2.0},

@@ -10,11 +10,10 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.regression import training
 from models.regression.dataset import walks_of
-from models.regression.recipe import DEFAULT, PAPER, TrainingPlan
+from models.regression.recipe import DEFAULT, PAPER, TrainingPlan, TrainingProgress
 from models.regression.training import (
     HeldOutCheckError,
     HeldOutMetrics,
-    TrainingProgress,
     check_held_out,
     train,
 )

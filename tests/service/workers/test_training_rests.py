@@ -7,12 +7,12 @@ import pytest
 
 from models.errors import CalibrationError
 from models.regression import recipe
-from models.regression.recipe import TrainingPlan
+from models.regression.recipe import TrainingPlan, TrainingProgress
 from models.simulation.walkers import WalkConfig
 from service.job_queue import JobQueue
 from service.store.engines.store import Store
 from service.workers.context import JobContext
-from service.workers.train import Progress, may_go_on, train_apart
+from service.workers.train import may_go_on, train_apart
 
 _RESTS = 6  # ticks, each of half a second: no step of this training takes that long
 
@@ -32,7 +32,7 @@ def test_it_rests_while_it_may_not_go_on_and_its_limit_with_it(settings, lens, p
         rested.append(steps[-1])
         return False
 
-    def note(told: Progress | None) -> None:
+    def note(told: TrainingProgress | None) -> None:
         if told is not None:
             steps.append(told.step)
 

@@ -9,7 +9,7 @@ import pytest
 from service.store.engines.store import Store
 from service.store.workers import WorkerRecord
 from service.workers.context import RunningJobs
-from service.workers.processes.local_workers import pause_s
+from service.workers.processes.children import pause_s
 from service.workers.processes.workers import Watch, heartbeat, note_trouble, register_worker
 
 LOST_S = 0.2
