@@ -184,7 +184,7 @@ def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
     log_path = settings.data_dir / "serve.log"
     with log_path.open("w") as log:
         process = subprocess.Popen(
-            [sys.executable, "-m", "service.cli", "serve", "--follow-stdin"],
+            [sys.executable, "-Pm", "service.cli", "serve", "--follow-stdin"],
             env=settings.as_environment(),
             stdin=subprocess.PIPE,  # its other end closes when we end, in whatever way
             stdout=log,

@@ -50,7 +50,7 @@ class LocalBridge:
 
     def _run(self, _: int) -> int:
         """Run it until it ends or is to end; returns its exit status."""
-        command = [sys.executable, "-m", "service.cli", "bridge", "--url", self._url]
+        command = [sys.executable, "-Pm", "service.cli", "bridge", "--url", self._url]
         with subprocess.Popen(
             [*command, "--follow-stdin"],
             stdin=subprocess.PIPE,

@@ -34,7 +34,7 @@ def read_apart(reader: str, body: bytes, *said: str, within_s: float = MAX_SECON
     try:
         done = subprocess.run(
             # All paths are said, so `site` would only take a third of the time to find them again.
-            [sys.executable, "-S", "-m", reader, str(MAX_CPU_S), *said],
+            [sys.executable, "-SPm", reader, str(MAX_CPU_S), *said],
             input=body,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -222,7 +222,7 @@ def _process(
     order: dict[str, Any], settings: Settings
 ) -> Iterator[tuple[subprocess.Popen[bytes], "queue.Queue[dict[str, Any] | None]"]]:
     process = subprocess.Popen(
-        [sys.executable, "-m", "service.workers.training_process"],
+        [sys.executable, "-Pm", "service.workers.training_process"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env=settings.as_environment(),

@@ -78,7 +78,8 @@ class LocalWorkers:
         """Run a worker until it ends, hangs or is to end; returns its exit status."""
         reported = deaths >= _REPORTED_FROM
         with subprocess.Popen(
-            [sys.executable, "-m", "service.cli", "worker", "--name", name, "--follow-stdin"],
+            # -P: of the installed package, like us, and not of the folder that we were called in.
+            [sys.executable, "-Pm", "service.cli", "worker", "--name", name, "--follow-stdin"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=self._settings.as_environment(),
