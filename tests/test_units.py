@@ -20,6 +20,7 @@ TELLING = {
     "service/estimation/estimates.py",
     "service/notifications/outbox.py",
     "service/reasons.py",
+    "service/reports/weekly.py",
 }
 
 

@@ -49,12 +49,13 @@ def lately_s() -> float:
 class Street:
     """People who walk past a camera one after the other, and the camera's service."""
 
+    source: str | None = None  # of their tracks; the default one's, where none is named
+
     def __init__(self, http: Any, settings: Any) -> None:
         self.go_on(http, settings)
         self.clock_s = lately_s()
         self.seed = 0
         self.seen: list[Trajectory] = []
-        self.source: str | None = None
         self._bodies: list[dict[str, Any]] = []
         self._lanes: list[Lane] = []
 

@@ -1,3 +1,4 @@
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from math import inf, nan, radians
 
@@ -69,14 +70,22 @@ def test_the_seed_alone_makes_the_weights(plan: TrainingPlan) -> None:
 
 
 @pytest.mark.usefixtures("hardly_checked")
+@pytest.mark.parametrize("has_them", [True, False])
 def test_products_are_of_bfloat16_only_where_the_processor_has_them(
-    plan: TrainingPlan, monkeypatch: pytest.MonkeyPatch
+    plan: TrainingPlan, monkeypatch: pytest.MonkeyPatch, has_them: bool
 ) -> None:
-    exact = weights(replace(plan, recipe=replace(plan.recipe, arithmetic="float32")))
-    for has_them in (True, False):
-        can = {"avx512_bf16": has_them}
-        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda can=can: can, raising=False)
-        assert torch.equal(weights(plan), exact) != has_them
+    """By what is asked for: a processor without them cannot be made to multiply them."""
+    asked = []
+
+    def autocast(device: str, dtype: torch.dtype, *, enabled: bool) -> AbstractContextManager[None]:
+        asked.append((device, dtype, enabled))
+        return nullcontext()
+
+    monkeypatch.setattr(torch, "autocast", autocast)
+    capabilities = {"avx512_bf16": has_them}
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: capabilities, raising=False)
+    train(plan)
+    assert set(asked) == {("cpu", torch.bfloat16, has_them)}
     assert PAPER.arithmetic == "float32"
 
 

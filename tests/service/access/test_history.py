@@ -122,6 +122,8 @@ def look_after_cameras(http, bench):
     headers = {"Content-Type": "image/jpeg"}
     ask(http, "PUT", "/cameras/corner/snapshot", content=still(), headers=headers)
     ask(http, "DELETE", "/cameras/corner/snapshot")
+    ask(http, "PUT", "/cameras/corner/plan?metres_per_pixel=0.1", content=still(), headers=headers)
+    ask(http, "DELETE", "/cameras/corner/plan")
     door = {"id": "door", "on": "ground", "points": [[300, 400], [500, 410], [480, 600]]}
     ask(http, "PUT", "/cameras/corner/zones", json={"zones": [door]}, headers=ANY)
     for change in ({"name": "The other corner"}, {"walking_speed": {"mean_mps": 1.3}}):

@@ -20,12 +20,6 @@ class Trackers(Street):
 
     source = "tracker-1.2"
 
-    def _post(self):
-        body = {"source": self.source, "tracks": self._bodies}
-        answer = self.http.post("/cameras/corner/tracks", json=body)
-        assert answer.json()["accepted"] == len(self._bodies), answer.text
-        self._bodies.clear()
-
     def reconcile(self):
         with self.context.store.write() as session:
             reconciliation.reconcile_camera(
