@@ -6,6 +6,14 @@ from tests.browser.conftest import axe, shoot, too_wide
 from tests.service.fleet_bench import Fleet
 
 pytestmark = pytest.mark.slow
+# Clicks once more at a place, as soon as a row has gone.
+AGAIN = """([clientX, clientY]) => new MutationObserver((_, watch) => {
+  if (document.querySelectorAll(".alert-row").length !== 1) return;
+  watch.disconnect();
+  const button = document.elementFromPoint(clientX, clientY);
+  window.under = button.textContent;
+  button.dispatchEvent(new MouseEvent("click", { bubbles: true, detail: 1, clientX, clientY }));
+}).observe(document.body, { childList: true, subtree: true })"""
 
 
 def test_twelve_cameras_take_three_clicks_and_it_stays_live(page, server):
@@ -49,3 +57,29 @@ def test_twelve_cameras_take_three_clicks_and_it_stays_live(page, server):
         ("mended", "Ada"),
     }
     fleet.close()
+
+
+def test_a_second_click_at_one_place_answers_no_other_alert(page, server):
+    """The next row's button comes to lie under the pointer as soon as the first one's row goes."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    fleet = Fleet(server.settings)
+    for camera_id in ("first", "second"):
+        fleet.add(camera_id, tilt_deg=3.0)
+        fleet.knock(camera_id)
+    fleet.close()
+    page.goto("/ui/alerts")
+    page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
+    rows = page.locator(".alert-row")
+    box = rows.first.get_by_role("button", name="It did not move").bounding_box()
+    at = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.evaluate(AGAIN, at)
+    page.mouse.click(*at)
+    expect(rows).to_have_count(1)
+    assert page.evaluate("window.under").strip() == "It did not move"
+    page.wait_for_timeout(500)
+    found = server.http.get("/alerts").json()["items"]
+    assert sorted(a["outcome"] or "" for a in found) == ["", "false_alarm"]
+    # A while later it is meant.
+    page.wait_for_timeout(1000)
+    page.mouse.click(*at)
+    expect(page.locator("#rows")).to_contain_text("No alert is like that")

@@ -35,6 +35,8 @@ async function refresh() {
   const kept = new Set(picked().map((row) => row.id));
   const held = document.activeElement?.closest?.("li.alert-row")?.id;
   list.replaceChildren(...fresh.getElementById("alerts").childNodes);
+  list.dispatchEvent(new Event("renewed"));
+  document.title = fresh.title;
   for (const id of kept) {
     const box = document.querySelector(`#${CSS.escape(id)} .pick`);
     if (box) box.checked = true;
