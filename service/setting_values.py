@@ -15,6 +15,7 @@ _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 
 WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 _ADDRESS = re.compile(r"[!-?A-~]+@[!-?A-~]+")  # of printable ASCII; what takes it knows the rest
+_USER = re.compile(r"(?<=//)[^/@\s]*@")  # of a URL, with the password
 _MOST_WORKERS = 4  # unless more are asked for: each holds 240 MB
 
 
@@ -106,6 +107,11 @@ def read_camera_names(text: str) -> dict[str, str]:
             raise ValueError(f"name=camera-id, with commas, is needed, got {part!r:.80}")
         names[name] = camera_id
     return names
+
+
+def without_user(text: str) -> str:
+    """A text whose URLs tell neither a user nor a password."""
+    return _USER.sub("", text)
 
 
 def read_addresses(text: str) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.enums import Activity, AlertKind, Outcome
+from service.setting_values import without_user
 from service.settings import Settings
 from service.store import journal
 from service.store.access import actor_of, address_of
@@ -64,10 +65,10 @@ def note(
 def note_settings(session: Session, settings: Settings) -> None:
     """Keep the settings that are no defaults, where they are others than at the last start.
 
-    Of a secret, that it is set.
+    Of a secret, that it is set; of a URL, no user and no password.
     """
     given = {
-        name: str(value) if field.repr else "set"
+        name: without_user(str(value)) if field.repr else "set"
         for name, field in Settings.model_fields.items()
         if (value := getattr(settings, name)) != field.get_default(call_default_factory=True)
     }

@@ -10,14 +10,14 @@ from sqlalchemy.orm import Session
 from service.alerts import alerts, silence
 from service.api.ignored import NamingRoute
 from service.api.labels import MOST_TAGS, Tags
-from service.api.middleware.dependencies import AddressDep, AppState, CallerDep, StateDep
+from service.api.middleware.dependencies import AppState, StateDep, WritesDep
 from service.api.schemas import Body, Moment, Text, Who
 from service.cameras import cameras, decisions, maintenance, undo
 from service.cameras.answers import Decision
 from service.cameras.cameras import CameraChange
 from service.enums import Act, Answer
 from service.errors import ConflictError, ServiceError
-from service.store.access import name_in, set_actor
+from service.store.access import name_in
 
 _NEEDS = {Act.SILENCE: ("until",), Act.RESOLVE: ("outcome",), Act.MAINTENANCE: ("to",)}
 
@@ -76,7 +76,7 @@ router = APIRouter(tags=["alerts"], route_class=NamingRoute)
 
 
 @router.post("/acts")
-def act(body: ActsBody, state: StateDep, caller: CallerDep, address: AddressDep) -> ActsOut:
+def act(body: ActsBody, state: StateDep, write: WritesDep) -> ActsOut:
     """Do one act with many alerts or cameras. Each is a transaction: what one refuses stops none.
 
     `acknowledge`, `silence` and `resolve` take ids of alerts, all others ids of cameras.
@@ -85,8 +85,7 @@ def act(body: ActsBody, state: StateDep, caller: CallerDep, address: AddressDep)
     def done(one: str) -> ActDone:
         about = one if body.act in _OF_CAMERAS else None
         try:
-            with state.store.write(about) as session:
-                set_actor(session, caller, address)
+            with write(about) as session:
                 _DO[body.act](session, state, one, body)
         except ServiceError as error:  # of this id alone; the others are still to be done
             said = ActProblem(status=error.status, code=error.code, detail=error.detail)

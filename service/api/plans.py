@@ -6,12 +6,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Query, Response
 
-from service.api.middleware.dependencies import AddressDep, CallerDep, ReadDep, StateDep, WriteDep
+from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep, WritesDep
 from service.api.schemas import Out
 from service.api.snapshots import IMAGE_ANSWER, IMAGE_BODY, jpeg_answer, read_body
 from service.cameras import plans
 from service.formats.still import Still
-from service.store.access import set_actor
 
 
 class PlanOut(Out):
@@ -38,8 +37,7 @@ def put(
     camera_id: str,
     still: Annotated[Still, Depends(read_body)],
     state: StateDep,
-    caller: CallerDep,
-    address: AddressDep,
+    write: WritesDep,
     metres_per_pixel: Annotated[
         float, Query(ge=1e-4, le=100, allow_inf_nan=False, description="of the picture as sent")
     ],
@@ -52,8 +50,7 @@ def put(
 
     It is made anew without EXIF. Map points are shown on it; it goes with its camera.
     """
-    with state.store.write(camera_id) as session:
-        set_actor(session, caller, address)
+    with write(camera_id) as session:
         record = plans.put_plan(
             session, state.settings, camera_id, still, metres_per_pixel, north_deg
         )

@@ -7,18 +7,16 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from service.api.middleware.dependencies import (
-    AddressDep,
     BodyDep,
-    CallerDep,
     ReadDep,
     StateDep,
     WriteDep,
+    WritesDep,
     media_type_of,
 )
 from service.api.schemas import Moment, Out
 from service.cameras import cameras, snapshots
 from service.formats.still import Still, read_still
-from service.store.access import set_actor
 
 
 class SnapshotOut(Out):
@@ -54,16 +52,14 @@ def put(
     camera_id: str,
     still: Annotated[Still, Depends(read_body)],
     state: StateDep,
-    caller: CallerDep,
-    address: AddressDep,
+    write: WritesDep,
     taken_at: Annotated[Moment | None, Query(description="now, if not given")] = None,
 ) -> SnapshotOut:
     """Take a still image of what the camera sees, made anew without EXIF, at most 1920 px wide.
 
     It is compared with the pictures before it, and kept where the settings say so.
     """
-    with state.store.write(camera_id) as session:
-        set_actor(session, caller, address)
+    with write(camera_id) as session:
         facts = snapshots.put_snapshot(session, state.queue, camera_id, still, taken_at)
     return SnapshotOut.model_validate(facts)
 

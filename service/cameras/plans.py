@@ -1,6 +1,5 @@
 """The plan of what a camera sees, from above: places on it are the metres of map points."""
 
-import hashlib
 import math
 from datetime import UTC, datetime
 
@@ -8,6 +7,7 @@ from sqlalchemy.orm import Session
 
 from service.access.activity import note
 from service.cameras.cameras import require_camera
+from service.cameras.snapshots import columns_of
 from service.enums import Activity
 from service.errors import NotFoundError, SwitchedOffError
 from service.formats.still import Still
@@ -40,21 +40,19 @@ def put_plan(
     """
     require_camera(session, camera_id)
     _require_pictures(settings)
-    digest = hashlib.sha256(still.jpeg).hexdigest()
     record = session.merge(
         PlanRecord(
             camera_id=camera_id,
-            jpeg=still.jpeg,
-            sha256=digest,
-            width=still.width,
-            height=still.height,
+            **columns_of(still),
             metres_per_pixel=metres_per_pixel * still.sent_width / still.width,
             north_rad=math.radians(north_deg),
             stored_at=datetime.now(UTC),
         )
     )
     session.flush()
-    note(session, Activity.PLAN_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
+    note(
+        session, Activity.PLAN_KEPT, by=None, camera_id=camera_id, details={"sha256": record.sha256}
+    )
     return record
 
 

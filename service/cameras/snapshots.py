@@ -2,6 +2,7 @@
 
 import hashlib
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -62,7 +63,6 @@ def put_snapshot(
             f"got {still.width} x {still.height}"
         )
         raise MalformedError(f"body: {reason}", (FieldError(pointer="", reason=reason),))
-    digest = hashlib.sha256(still.jpeg).hexdigest()
     now = datetime.now(UTC)
     taken_at = min(taken_at or now, now)  # a clock that is ahead makes no picture newer than now
     last_at = newest_at(session, camera_id)
@@ -71,10 +71,7 @@ def put_snapshot(
     record = session.merge(
         SnapshotRecord(
             camera_id=camera_id,
-            jpeg=still.jpeg,
-            sha256=digest,
-            width=still.width,
-            height=still.height,
+            **columns_of(still),
             taken_at=taken_at,
             stored_at=now,
             compared_at=None,
@@ -82,8 +79,15 @@ def put_snapshot(
     )
     session.flush()
     request_estimate(session, queue, camera_id)
-    note(session, Activity.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details={"sha256": digest})
+    details = {"sha256": record.sha256}
+    note(session, Activity.SNAPSHOT_KEPT, by=None, camera_id=camera_id, details=details)
     return record
+
+
+def columns_of(still: Still) -> dict[str, Any]:
+    """A still image as the columns of any image of a camera."""
+    digest = hashlib.sha256(still.jpeg).hexdigest()
+    return dict(jpeg=still.jpeg, sha256=digest, width=still.width, height=still.height)
 
 
 def show_snapshot(session: Session, settings: Settings, camera_id: str) -> SnapshotRecord:

@@ -6,7 +6,6 @@ import math
 import shutil
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -40,6 +39,7 @@ from service.commands.replay import post_tracks
 from service.commands.settings_given import settings_given
 from service.data_dir import StartError, running_in
 from service.enums import AlertState, ReferenceState
+from service.interpreter import command_of
 from service.settings import Settings
 from service.workers.processes.process import end_like_ctrl_c
 
@@ -184,7 +184,7 @@ def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
     log_path = settings.data_dir / "serve.log"
     with log_path.open("w") as log:
         process = subprocess.Popen(
-            [sys.executable, "-Pm", "service.cli", "serve", "--follow-stdin"],
+            command_of("service.cli", "serve", "--follow-stdin"),
             env=settings.as_environment(),
             stdin=subprocess.PIPE,  # its other end closes when we end, in whatever way
             stdout=log,

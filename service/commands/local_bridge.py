@@ -2,10 +2,10 @@
 
 import logging
 import subprocess
-import sys
 import threading
 from typing import Self
 
+from service.interpreter import command_of
 from service.settings import Settings
 from service.workers.processes import exits
 from service.workers.processes.children import TICK_S, ended, keep_alive
@@ -50,9 +50,8 @@ class LocalBridge:
 
     def _run(self, _: int) -> int:
         """Run it until it ends or is to end; returns its exit status."""
-        command = [sys.executable, "-Pm", "service.cli", "bridge", "--url", self._url]
         with subprocess.Popen(
-            [*command, "--follow-stdin"],
+            command_of("service.cli", "bridge", "--url", self._url, "--follow-stdin"),
             stdin=subprocess.PIPE,
             env=self._environment,
         ) as process:

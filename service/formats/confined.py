@@ -13,6 +13,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from service.interpreter import command_of
+
 MAX_SECONDS = 10.0
 MAX_CPU_S = 5
 MAX_MEMORY_BYTES = 1024 * 1024 * 1024  # above what the libraries have mapped already
@@ -34,7 +36,7 @@ def read_apart(reader: str, body: bytes, *said: str, within_s: float = MAX_SECON
     try:
         done = subprocess.run(
             # All paths are said, so `site` would only take a third of the time to find them again.
-            [sys.executable, "-SPm", reader, str(MAX_CPU_S), *said],
+            command_of(reader, str(MAX_CPU_S), *said, options="S"),
             input=body,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -1,6 +1,5 @@
 """`/docs`, `/ui/settings`, `/ui/glossary`: the API to try, what is set, what words mean."""
 
-import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +8,11 @@ from fastapi.responses import HTMLResponse
 
 from service.api.middleware.dependencies import StateDep
 from service.api.middleware.pages import VIEWER_SCRIPT_URL, VIEWER_STYLE_URL, render
+from service.setting_values import without_user
 from service.settings import Settings
 from service.wording.glossary import WORDS
 
 _UNSET, _BY_MACHINE = "unset", "by the machine"
-_USER = re.compile(r"(?<=//)[^/@\s]*@")  # of a URL, with the password
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +51,7 @@ def _said(value: Any) -> str:
         return _UNSET
     if isinstance(value, bool):
         return str(value).lower()
-    return _USER.sub("", f"{value:g}" if isinstance(value, float) else str(value))
+    return without_user(f"{value:g}" if isinstance(value, float) else str(value))
 
 
 router = APIRouter(include_in_schema=False)

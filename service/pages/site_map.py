@@ -12,14 +12,15 @@ from models.monitoring.verdict import pose_after
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.api.schemas import Text
-from service.cameras.cameras import CameraView, list_cameras
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import PoseState
 from service.pages.drawings.site_map import SiteCamera, site_map_svg
 from service.store import cameras, journal
+from service.store.cameras import CameraRecord, PriorPoseRecord
 from service.wording.camera import STATES, shown_as
 
 _MOST = 300  # cameras of a map: more hide one another
+_SetUp = tuple[CameraRecord, PriorPoseRecord]
 
 router = APIRouter(include_in_schema=False)
 
@@ -33,10 +34,10 @@ def show(
 ) -> HTMLResponse:
     """The map of a site, or of all sites; cameras without a place are listed beside it."""
     newest = journal.newest_event_id(session)
-    found = list_cameras(session, state.settings, "", _MOST + 1, site=site)
-    shown = found[:_MOST]
-    statuses = camera_statuses(session, state.settings, [each.record.id for each in shown])
-    placed = [_on_map(each, statuses[each.record.id]) for each in _with_places(shown)]
+    ids = cameras.ids_labelled(session, "", site, ())
+    statuses = camera_statuses(session, state.settings, ids[:_MOST])
+    found = [(record, prior) for record, prior, _ in cameras.all_as_set_up(session, statuses)]
+    placed = [_on_map(*each, statuses[each[0].id]) for each in _with_places(found)]
     on_map = {each.id for each in placed}
     return render(
         request,
@@ -46,19 +47,19 @@ def show(
         sites=cameras.sites(session),
         drawing=site_map_svg(placed),
         placed=placed,
-        beside=[each.record for each in shown if each.record.id not in on_map],
-        most=_MOST if len(found) > _MOST else None,
+        beside=[record for record, _ in found if record.id not in on_map],
+        most=_MOST if len(ids) > _MOST else None,
     )
 
 
-def _on_map(view: CameraView, status: CameraStatus) -> SiteCamera:
-    shown = shown_as(view.state, status.alerts)
+def _on_map(record: CameraRecord, prior: PriorPoseRecord, status: CameraStatus) -> SiteCamera:
+    shown = shown_as(status.state, status.alerts)
     return SiteCamera(
-        id=view.record.id,
-        name=view.record.name,
-        lens=view.intrinsics,
-        prior=view.prior_pose,
-        now=_now(status, view.prior_pose),
+        id=record.id,
+        name=record.name,
+        lens=record.intrinsics,
+        prior=prior.pose,
+        now=_now(status, prior.pose),
         shown=shown,
         state=STATES[shown],
     )
@@ -71,9 +72,9 @@ def _now(status: CameraStatus, prior: CameraPose) -> CameraPose | None:
     return pose_after(status.drift, prior)
 
 
-def _with_places(found: Sequence[CameraView]) -> list[CameraView]:
+def _with_places(found: Sequence[_SetUp]) -> list[_SetUp]:
     """Those that somebody has given a pose and a place: several at one point have nobody's."""
-    known = [each for each in found if each.calibrated]
-    at = Counter((each.prior_pose.x_m, each.prior_pose.y_m) for each in known)
+    known = [each for each in found if not each[1].assumed]
+    at = Counter((prior.x_m, prior.y_m) for _, prior in known)
     alone = len(found) == 1
-    return [x for x in known if alone or at[x.prior_pose.x_m, x.prior_pose.y_m] == 1]
+    return [each for each in known if alone or at[each[1].x_m, each[1].y_m] == 1]

@@ -5,7 +5,6 @@ import json
 import logging
 import queue
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +16,7 @@ from typing import Any
 from models.errors import CalibrationError
 from models.regression.recipe import TrainingPlan, TrainingProgress, plan_to_config
 from service.enums import TrainingState
+from service.interpreter import command_of
 from service.settings import Settings
 from service.training import (
     TrainingAttempt,
@@ -222,7 +222,7 @@ def _process(
     order: dict[str, Any], settings: Settings
 ) -> Iterator[tuple[subprocess.Popen[bytes], "queue.Queue[dict[str, Any] | None]"]]:
     process = subprocess.Popen(
-        [sys.executable, "-Pm", "service.workers.training_process"],
+        command_of("service.workers.training_process"),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env=settings.as_environment(),

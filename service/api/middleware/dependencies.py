@@ -5,7 +5,8 @@ do.
 """
 
 import threading
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -79,16 +80,33 @@ async def get_address(request: Request) -> str:
 AddressDep = Annotated[str, Depends(get_address)]
 
 
-def write_session(
-    request: Request, state: StateDep, caller: CallerDep, address: AddressDep
-) -> Iterator[Session]:
+Writes = Callable[[str | None], AbstractContextManager[Session]]
+
+
+async def get_writes(state: StateDep, caller: CallerDep, address: AddressDep) -> Writes:
+    """Sessions that write about a camera, or about everything: None.
+
+    They do so in the name of the caller, whatever name a body says.
+    """
+
+    @contextmanager
+    def write(about: str | None) -> Iterator[Session]:
+        with state.store.write(about) as session:
+            set_actor(session, caller, address)
+            yield session
+
+    return write
+
+
+WritesDep = Annotated[Writes, Depends(get_writes)]
+
+
+def write_session(request: Request, write: WritesDep) -> Iterator[Session]:
     """A session that commits before the answer is sent, or not at all.
 
-    It writes about the camera that the path names, or about everything; and in the name of the
-    caller, whatever name a body says.
+    It writes about the camera that the path names, or about everything.
     """
-    with state.store.write(request.path_params.get("camera_id")) as session:
-        set_actor(session, caller, address)
+    with write(request.path_params.get("camera_id")) as session:
         yield session
 
 

@@ -3,7 +3,6 @@
 import contextlib
 import logging
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -13,6 +12,7 @@ from typing import IO, Self
 from sqlalchemy.exc import SQLAlchemyError
 
 from service.errors import OverloadedError
+from service.interpreter import command_of
 from service.settings import Settings
 from service.store.engines.store import Store
 from service.workers.processes import exits
@@ -78,8 +78,7 @@ class LocalWorkers:
         """Run a worker until it ends, hangs or is to end; returns its exit status."""
         reported = deaths >= _REPORTED_FROM
         with subprocess.Popen(
-            # -P: of the installed package, like us, and not of the folder that we were called in.
-            [sys.executable, "-Pm", "service.cli", "worker", "--name", name, "--follow-stdin"],
+            command_of("service.cli", "worker", "--name", name, "--follow-stdin"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=self._settings.as_environment(),

@@ -223,6 +223,15 @@ def test_settings_are_kept_where_they_are_others_than_before_and_no_secret(http,
     assert "pass word" not in str(entries)
 
 
+def test_no_password_of_a_url_is_kept_with_the_settings(http, settings):
+    url = "https://ada:a-pass-word@surefoot.example/x"
+    with Store(settings).write() as session:
+        note_settings(session, settings.model_copy(update={"public_url": url}))
+    (entry,) = http.get("/activity").json()["items"]
+    assert entry["details"]["public_url"] == "https://surefoot.example/x"
+    assert "a-pass-word" not in str(entry)
+
+
 def test_days_are_chosen_and_a_file_goes_on_from_a_cursor(http, settings):
     with Store(settings).write() as session:
         for n in range(1203):
