@@ -95,9 +95,11 @@ def _machine_code(function: FunctionType) -> Any:
     made: Any = numba.njit(cache=folder is not None, error_model="numpy", nogil=True)(function)
     if folder is not None:
         kept = made._cache  # private; pinned, and tests/models/test_compiled.py cuts files off
-        source = kept._impl.locator.get_source_stamp()
-        stamp = (numba.__version__, source)
-        kept._cache_file = CodeFiles(Path(kept.cache_path), kept._impl.filename_base, stamp)
+        name = f"{function.__module__}.{kept._impl.filename_base}"
+        stamp: tuple[object, ...] = (numba.__version__,)
+        if not name.startswith("models."):  # of what is not, the folder's name says nothing
+            stamp += (function.__code__.co_filename, kept._impl.locator.get_source_stamp())
+        kept._cache_file = CodeFiles(folder, name, stamp)
     return made
 
 
@@ -106,7 +108,8 @@ def _folder() -> Path | None:
     """The first folder for code of these sources that can be written; None where none can.
 
     Code holds what it calls, and constants, of other files, too: a change of any source makes
-    another folder, where numba looks at the function's own file alone.
+    another folder, where numba looks at the function's own file alone. Copies of the same sources
+    share one: where they lie makes no difference to it.
     """
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.rglob("*.py")):

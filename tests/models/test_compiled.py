@@ -38,14 +38,18 @@ assert "numba" not in sys.modules
 print(models.outer.total(numpy.arange(4.0)))
 stats = models.outer.total.made().stats
 print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
-print(stats.cache_path)
+print(models.compiled._folder() or "")
 """
 
 
 @pytest.fixture
 def ask(tmp_path):
-    package = tmp_path / "models"
-    package.mkdir()
+    return asking(tmp_path)
+
+
+def asking(folder):
+    package = folder / "models"
+    package.mkdir(parents=True)
     for name in ("__init__.py", "compiled.py", "code_files.py", "effort.py"):
         shutil.copy(Path(models.__path__[0]) / name, package)
     (package / "outer.py").write_text(OUTER)
@@ -55,8 +59,8 @@ def ask(tmp_path):
         command = [sys.executable, "-c", f"{first}\n{ASK}"]
         told = subprocess.run(
             command,
-            cwd=tmp_path,
-            env=environment or {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "code")},
+            cwd=folder,
+            env=environment or {**os.environ, "NUMBA_CACHE_DIR": str(folder / "code")},
             capture_output=True,
             text=True,
             check=True,
@@ -74,6 +78,12 @@ def test_another_process_finds_the_code_unless_any_source_has_changed(ask):
     assert ask(factor=3, limit=7) == (3 + 6 + 7, "0 1")
 
 
+def test_a_copy_of_the_sources_finds_the_code(ask, tmp_path):
+    shared = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "code")}
+    assert ask(shared, factor=2, limit=5) == (11, "0 1")
+    assert asking(tmp_path / "copy")(shared, factor=2, limit=5) == (11, "1 0")
+
+
 def test_no_code_is_kept_among_sources(ask, tmp_path):
     usual = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     ask(usual, factor=2, limit=5)
@@ -82,7 +92,7 @@ def test_no_code_is_kept_among_sources(ask, tmp_path):
         assert not ask.place.is_relative_to(tmp_path)
         assert not list(tmp_path.rglob("*.nb?"))
     finally:
-        shutil.rmtree(ask.place.parent)
+        shutil.rmtree(ask.place)
 
 
 def test_code_of_former_sources_is_removed_beside_new_code(ask, tmp_path):
@@ -112,13 +122,13 @@ def with_one_other_byte(whole):
 @pytest.mark.parametrize("damage", [cut_off, emptied, with_one_other_byte])
 def test_code_that_a_crash_has_damaged_is_compiled_anew_once(ask, damage):
     assert ask(factor=2, limit=5) == (11, "0 1")
-    files = sorted(ask.place.rglob("*"))
+    files = sorted(ask.place.rglob("*.nbc"))
     assert len(files) == 2  # of the function and of what it calls
     for file in files:
         file.write_bytes(damage(file.read_bytes()))
     assert ask(factor=2, limit=5) == (11, "0 1")
     assert ask(factor=2, limit=5) == (11, "1 0")
-    assert sorted(ask.place.rglob("*")) == files
+    assert sorted(ask.place.rglob("*.nbc")) == files
 
 
 def test_code_that_others_may_have_written_is_not_run(ask, tmp_path):
@@ -126,7 +136,7 @@ def test_code_that_others_may_have_written_is_not_run(ask, tmp_path):
     first = "import sys; sys.prefix = sys.base_prefix"
     given = {**users, "NUMBA_CACHE_DIR": str(tmp_path / "code")}
     assert ask(given, first, factor=2, limit=5) == (11, "0 1")
-    folder = ask.place.parent
+    folder = ask.place
     assert folder.stat().st_mode & 0o077 == 0
     folder.chmod(0o777)
     assert ask(given, first, factor=2, limit=5) == (11, "0 1")
