@@ -105,7 +105,8 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
         exception_handlers=dict.fromkeys(FORESEEN, answer_of),
     )
-    # A path is looked for in one after another: what is asked for most comes first.
+    # A path is looked for in one after another: what is asked for most comes first. As they are:
+    # `include_router` takes each of them apart again, at every start.
     for module in (
         tracks,
         poses,
@@ -142,7 +143,7 @@ def create_app(settings: Settings) -> FastAPI:
         tokens,
         access,
     ):
-        app.include_router(module.router)
+        app.router.routes.extend(module.router.routes)
     documented.document_errors(app)
     pages.mount_static(app)
     # The last one is outermost.
