@@ -66,7 +66,7 @@ class Origin(StrEnum):
 
 
 class AlertKind(StrEnum):
-    """The kind of an alert."""
+    """The kind of an alert; the last two are of a group."""
 
     DRIFT = "drift"
     NO_DATA = "no_data"
@@ -75,6 +75,8 @@ class AlertKind(StrEnum):
     STALE = "stale"
     TRACKER = "tracker"
     PICTURE = "picture"
+    MANY_MOVED = "many_moved"
+    MANY_SILENT = "many_silent"
 
 
 class AlertState(StrEnum):

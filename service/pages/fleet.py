@@ -19,6 +19,7 @@ from service.api.schemas import Text
 from service.cameras.reference_views import reference_views
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, TokenScope
+from service.pages.bulk import bulk_rule
 from service.pages.drawings.sparkline import sparkline
 from service.pages.fleet_index import (
     Entry,
@@ -36,6 +37,7 @@ from service.store.fleet import Label
 from service.store.trainings import TrainingRecord
 from service.wording import alerts as alert_words
 from service.wording.camera import (
+from service.wording.acts import ACTS
     STATES,
     fleet_alert_flags,
     fleet_flags,
@@ -273,3 +275,5 @@ def _words(request: Request, state: AppState) -> dict[str, Any]:
         in_words=group_in_words,
         flags_of=fleet_alert_flags,
     )
+        act_words=ACTS,
+        rule=bulk_rule(),

@@ -45,7 +45,7 @@ _LONGEST_TEXT = 40  # lines
 # What depends on how fast this machine is.
 _MEASURED = {
     **{"worker_silent_s": 1.2, "queue_lag_s": 0.4, "taken_up_after_s": 660.0},
-    "done": "seen by Ada after 11 minutes, open for 2 hours",
+    "done": "acknowledged by Ada after 11 minutes, open for 2 hours",
 }
 
 Examples = dict[str, Any]

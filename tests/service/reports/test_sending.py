@@ -7,13 +7,17 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from pydantic import ValidationError
 
+from service.alerts.staleness import StaleWatch
 from service.job_queue import JobQueue
 from service.operations.troubles import find_troubles
 from service.reports.sending import due_at, mail_text, next_period
 from service.reports.weekly import make_report
 from service.settings import Settings
 from service.store import reports
+from service.store.alerts import AlertRecord
+from service.store.journal import activity_after
 from service.workers.context import JobContext
+from service.workers.upkeep.reconciliation import run_reconcile
 from service.workers.upkeep.reports import ReportRounds
 from tests.running import RunningService, free_port, wait_for
 from tests.service.fleet_bench import Fleet
@@ -142,13 +146,15 @@ def test_a_mail_says_what_the_report_says(settings):
         "Moved (1)",
         "- Corner 1: tilt +3.0°, since Tue 24 Mar, 10:40; put back by Ada after 3 hours",
         "",
-        "Clocks (2)",
-        "- 3 cameras of bytetrack: a wrong clock, since Thu 26 Mar, 09:00; ended by itself after "
-        "60 minutes",
+        "Clocks (1)",
         "- Corner 1: people seem to walk too fast or too slowly: its clock or frame rate looks "
         "wrong, since Fri 20 Mar, 09:00; put right by Bo after 4 days",
         "",
-        "Called false (1)",
+        "Other alerts (1)",
+        "- 3 cameras of bytetrack: a wrong clock, since Thu 26 Mar, 09:00; ended by itself after "
+        "60 minutes",
+        "",
+        "False alarms (1)",
         "- Corner 2: a wrong clock, since Wed 25 Mar, 09:00; false alarm by Bo after 30 minutes",
         "",
         "Silent now (1): The quay",
