@@ -256,6 +256,17 @@ def unheeded(session: Session, since: datetime, now: datetime) -> Sequence[Alert
     ).all()
 
 
+def unmailed(session: Session, now: datetime) -> Sequence[AlertRecord]:
+    """Open alerts that were escalated, wait still, and of which no mail has told yet."""
+    mailed = exists().where(
+        ActivityRecord.subject_id == AlertRecord.id,
+        ActivityRecord.what == Activity.ALERT_MAILED,
+        ActivityRecord.at >= AlertRecord.escalated_at,
+    )
+    query = _waiting(now).where(AlertRecord.escalated_at.is_not(None), ~mailed)
+    return session.scalars(query.order_by(AlertRecord.opened_at)).all()
+
+
 def _all_firing(*conditions: ColumnElement[bool]) -> Select[AlertRecord]:
     return select(AlertRecord).where(AlertRecord.state == AlertState.FIRING, *conditions)
 

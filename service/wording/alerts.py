@@ -119,11 +119,14 @@ DONE = {
     Activity.PLAN_KEPT: "put a plan of the site",
     Activity.PLAN_REMOVED: "deleted the plan of the site",
     Activity.ZONES_DRAWN: "drew the zones anew",
+    Activity.HANDOVER_GIVEN: "handed over",
+    Activity.HANDOVER_TAKEN: "took over",
 }
 _HAPPENED = {
     Activity.ALERT_OPENED: "Alert: {kind}",
     Activity.ALERT_GREW: "It grew: {alert} is critical now",
     Activity.ALERT_ESCALATED: "Nobody took up {alert}: it was told once more",
+    Activity.ALERT_MAILED: "A mail told that nobody took up {alert}",
     Activity.REFERENCE_LEARNED: "The reference was learned",
     Activity.MAINTENANCE_OVER: "The maintenance is over",
     Activity.TRAINING_SUCCEEDED: "A training ended: its model is in use",
@@ -155,10 +158,10 @@ class AnswerWords:
     outcome: Answer
     label: str
     consequence: str
+    done: str
 
 
 def alert_line(alert: AlertRecord) -> str:
-    done: str
     """What an alert tells of, in a line of a list."""
     if alert.kind == AlertKind.CLOCK:
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
@@ -270,6 +273,16 @@ def alert_summary(
     return f"{kind.replace('_', ' ')}: {whose}"
 
 
+def is_act(entry: ActivityRecord) -> bool:
+    """True of what a person did to cameras and alerts."""
+    return entry.what in DONE and not _by_itself(entry)
+
+
+def _by_itself(entry: ActivityRecord) -> bool:
+    nobody = entry.by is None and entry.outcome in (None, *_UNASKED)
+    return entry.what in _BY_ITSELF and nobody
+
+
 def entry_words(entry: ActivityRecord, clock: Clock) -> str:
     """A sentence without the time: who did what."""
     kind = "" if entry.kind is None else KINDS[entry.kind].lower()
@@ -282,7 +295,7 @@ def entry_words(entry: ActivityRecord, clock: Clock) -> str:
     }
     if entry.what in _HAPPENED:
         text = _HAPPENED[entry.what]
-    elif entry.what in _BY_ITSELF and entry.by is None and entry.outcome in (None, *_UNASKED):
+    elif _by_itself(entry):
         text = _BY_ITSELF[entry.what]
     else:
         text = f"{{who}} {DONE.get(entry.what, entry.what)}"

@@ -348,6 +348,11 @@ def _others(run: _Run) -> None:
         {"name": "gate tracker", "scopes": ["ingest"], "cameras": ["corner"], "expires_at": year},
     )
     run.ask("GET", "/tokens")
+    shift = {"since": (run.begun - timedelta(hours=8)).isoformat(), "note": "gate 3 is repaired"}
+    given = run.ask("POST", "/handovers", shift | {"by": "Ada"})
+    path = "/handovers/{handover_id}/take"
+    run.ask("POST", path, {"by": "Bo"}, handover_id=given["id"])
+    run.ask("GET", "/handovers")
     run.ask("GET", "/activity")
     run.schemas["ActivityPage"]["items"] = run.schemas["ActivityPage"]["items"][:2]
     run.ask_for("application/x-ndjson", "/activity", {"limit": 2})

@@ -206,7 +206,14 @@ const later = gathered(look, 1000);
 subscribe((event) => (event.type === "alert" ? soon(event) : later(event)));
 setInterval(() => document.hidden || Promise.all([fetchAll(), fetchBanners()]).catch(console.warn), ALL_AGAIN_MS);
 keepTimes(list, document.getElementById("banners"));
-listen(document.getElementById("banners"), ALERT_ACTS);
+listen(document.getElementById("banners"), {
+  ...ALERT_ACTS,
+  answer: (said, button) => answer({ ...said, name: button.closest(".banner").dataset.name }),
+  async "take-over"({ handover }) {
+    await done("Taken over.", signed("POST", `/handovers/${handover}/take`));
+    await fetchBanners();
+  },
+});
 
 search.addEventListener("input", ask);
 search.form.addEventListener("submit", (event) => event.preventDefault());
@@ -255,13 +262,6 @@ function choose(ids, on) {
   say(matching());
 }
 
-list.addEventListener("change", ({ target }) => target.matches(".pick") && choose([target.closest("li").dataset.id], target.checked));
-all?.addEventListener("change", () => choose(matching().map(({ id }) => id), all.checked));
-document.getElementById("none-chosen")?.addEventListener("click", () => choose([...chosen], false));
-bulk?.addEventListener("click", (event) => {
-  const button = event.target.closest("button[data-bulk]");
-  if (button) guarded(button, () => withMany(button.dataset, chosenOnes(), () => choose([...chosen], false)));
-});
 const chosenOnes = () =>
   [...chosen].map((camera) => ({
     camera,
@@ -269,6 +269,13 @@ const chosenOnes = () =>
     name: rows.get(camera)?.querySelector(".who a").textContent,
   }));
 
+list.addEventListener("change", ({ target }) => target.matches(".pick") && choose([target.closest("li").dataset.id], target.checked));
+all?.addEventListener("change", () => choose(matching().map(({ id }) => id), all.checked));
+document.getElementById("none-chosen")?.addEventListener("click", () => choose([...chosen], false));
+bulk?.addEventListener("click", (event) => {
+  const button = event.target.closest("button[data-bulk]");
+  if (button) guarded(button, () => withMany(button.dataset, chosenOnes(), () => choose([...chosen], false)));
+});
 
 noteAll(JSON.parse(document.getElementById("index").textContent));
 keep(list.querySelectorAll("li.row"));
