@@ -276,3 +276,33 @@ def test_settings_that_cannot_be_are_refused(given, words):
 def test_the_password_is_shown_nowhere():
     settings = Settings(smtp_host="mail.example", smtp_password="a pass word", **MAIL)
     assert "a pass word" not in repr(settings)
+
+
+def test_what_nobody_took_up_is_mailed_once_and_again_where_it_was_not_taken(office, post_office):
+    """Only webhooks heard of an escalation."""
+    context = context_of(office, report_day=None, escalate_after_min=30.0, **post_office.settings)
+    long_ago = datetime.now(UTC) - timedelta(minutes=31)
+    with office.store.write() as session:
+        found = {a.camera_id: a for a in session.query(AlertRecord)}
+        for record in found.values():
+            record.opened_at = record.changed_at = long_ago
+        seen = found["c2"]
+        seen.acknowledged_by, seen.acknowledged_at = "Ada", long_ago
+    ReportRounds().run(context)
+    assert post_office.mails == []  # it is not escalated yet
+    run_reconcile(context, StaleWatch())
+    post_office.answer = "451 try again later"
+    ReportRounds().run(context)
+    post_office.answer = "250 OK"
+    for _ in range(2):
+        ReportRounds().run(context)
+    (mail,) = post_office.mails
+    assert post_office.senders[0][1] == ["ada@example.org", "bo@example.org"]
+    assert mail["Subject"] == "surefoot: nobody took up 1 alert"
+    told, _, url = mail.get_content().strip().splitlines()
+    assert told.startswith("- Corner 1: tilt +3.0°, since ")
+    assert told.endswith("; nobody took it up in 31 minutes")
+    assert url == "https://watch.example/ui/alerts?acknowledged=false"
+    with office.store.read() as session:
+        log = [entry.what for entry in activity_after(session, "c1", 0, 100)]
+    assert log[-2:] == ["alert.escalated", "alert.mailed"]
