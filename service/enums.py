@@ -66,7 +66,7 @@ class Origin(StrEnum):
 
 
 class AlertKind(StrEnum):
-    """The kind of an alert."""
+    """The kind of an alert; the last two are of a group."""
 
     DRIFT = "drift"
     NO_DATA = "no_data"
@@ -75,6 +75,8 @@ class AlertKind(StrEnum):
     STALE = "stale"
     TRACKER = "tracker"
     PICTURE = "picture"
+    MANY_MOVED = "many_moved"
+    MANY_SILENT = "many_silent"
 
 
 class AlertState(StrEnum):
@@ -144,6 +146,7 @@ class AlertActivity(StrEnum):
     OPENED = "opened"
     GREW = "grew"
     ESCALATED = "escalated"
+    MAILED = "mailed"
     ACKNOWLEDGED = "acknowledged"
     SILENCED = "silenced"
     SILENCE_ENDED = "silence_ended"
@@ -255,6 +258,7 @@ class Activity(StrEnum):
     ALERT_OPENED = "alert.opened"
     ALERT_GREW = "alert.grew"
     ALERT_ESCALATED = "alert.escalated"
+    ALERT_MAILED = "alert.mailed"
     ALERT_ACKNOWLEDGED = "alert.acknowledged"
     ALERT_SILENCED = "alert.silenced"
     ALERT_SILENCE_ENDED = "alert.silence_ended"
@@ -286,3 +290,5 @@ class Activity(StrEnum):
     SESSION_ENDED = "session.ended"
     LOGIN_REFUSED = "login.refused"
     SETTINGS_CHANGED = "settings.changed"
+    HANDOVER_GIVEN = "handover.given"
+    HANDOVER_TAKEN = "handover.taken"

@@ -203,7 +203,7 @@ class Settings(BaseSettings):
         "", description="address that reports are mailed from"
     )
     report_to: Annotated[str, values.readable(values.read_addresses)] = Field(
-        "", description="addresses, with commas, that reports are mailed to"
+        "", description="addresses, with commas, that reports and escalations are mailed to"
     )
     smtp_host: str | None = Field(None, description="mail server; unset: nothing is mailed")
     smtp_port: int | None = Field(

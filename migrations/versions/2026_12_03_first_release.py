@@ -23,18 +23,19 @@ TABLES = sa.MetaData(
 )
 # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
 NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
-ALERT_KINDS = "drift no_data clock unsure stale tracker picture"
+ALERT_KINDS = "drift no_data clock unsure stale tracker picture many_moved many_silent"
 OUTCOMES = "put_back accepted mended relearned false_alarm cleared camera_removed"
 ACTIVITY = (
     "camera.registered camera.changed camera.described camera.removed pose.agreed pose.accepted "
     "pose.put_back pose.mended pose.false_alarm pose.undone reference.reset reference.learned "
-    "source.used source.removed alert.opened alert.grew alert.escalated alert.acknowledged "
-    "alert.silenced alert.silence_ended alert.resolved alert.reopened maintenance.planned "
-    "maintenance.changed maintenance.ended maintenance.withdrawn maintenance.over "
-    "training.requested training.succeeded training.failed training.cancelled snapshot.kept "
-    "snapshot.removed plan.kept plan.removed zones.drawn webhook.added webhook.changed "
-    "webhook.secret_changed webhook.removed webhook.tested webhook.replayed token.added "
-    "token.revoked session.began session.ended login.refused settings.changed"
+    "source.used source.removed alert.opened alert.grew alert.escalated alert.mailed "
+    "alert.acknowledged alert.silenced alert.silence_ended alert.resolved alert.reopened "
+    "maintenance.planned maintenance.changed maintenance.ended maintenance.withdrawn "
+    "maintenance.over training.requested training.succeeded training.failed training.cancelled "
+    "snapshot.kept snapshot.removed plan.kept plan.removed zones.drawn webhook.added "
+    "webhook.changed webhook.secret_changed webhook.removed webhook.tested webhook.replayed "
+    "token.added token.revoked session.began session.ended login.refused settings.changed "
+    "handover.given handover.taken"
 )
 
 
@@ -452,6 +453,7 @@ table(
     one_of("outcome", OUTCOMES),
     Index(None, "camera_id", "id"),
     Index(None, "subject_id", "id"),
+    Index(None, "what", "id"),
     Index(None, "at"),
     sqlite_autoincrement=True,
 )

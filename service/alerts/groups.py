@@ -15,11 +15,6 @@ from service.store import alerts, tracks
 from service.store.alerts import AlertRecord
 from service.store.engines.store import also_about
 
-# What a group is called, and which alerts of cameras can have its cause.
-_CAUSES = {
-    AlertKind.CLOCK: (AlertKind.DRIFT, AlertKind.CLOCK),
-    AlertKind.NO_DATA: (AlertKind.NO_DATA,),
-}
 _FED_WITHIN = timedelta(days=1)  # a camera without tracks for longer is no longer fed by its source
 
 
@@ -30,13 +25,15 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     together once they are `group_cameras` or more, and at least `group_share` of all that get
     tracks of that source. Whoever comes later joins without a word.
     """
-    kind = next((kind for kind, kinds in _CAUSES.items() if record.kind in kinds), None)
+    kind = next((kind for kind, kinds in alerts.MEMBER_KINDS.items() if record.kind in kinds), None)
     if kind is None or record.track_source is None or record.group_id is not None:
         return None
     source = record.track_source
     also_about(session, f"source/{source}")  # cameras that move at the same moment see each other
     together = _together(
-        alerts.firing_of_source(session, source, _CAUSES[kind]), record, settings.group_within_s
+        alerts.firing_of_source(session, source, alerts.MEMBER_KINDS[kind]),
+        record,
+        settings.group_within_s,
     )
     group = alerts.firing_group(session, source, kind)
     known = group is not None and any(member.group_id == group.id for member in together)
@@ -107,7 +104,7 @@ def _began_at(record: AlertRecord) -> datetime:
 
 
 def _reason(group: AlertRecord) -> Reason:
-    silent = group.kind == AlertKind.NO_DATA
+    silent = group.kind == AlertKind.MANY_SILENT
     code = ServiceCode.FELL_SILENT_TOGETHER if silent else ServiceCode.MOVED_TOGETHER
     count, source = len(group.camera_ids or []), group.track_source or ""
     return Reason(code=code, values={"cameras": count, "track_source": source})

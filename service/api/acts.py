@@ -1,6 +1,7 @@
 """`POST /acts`: one act on many alerts or cameras, each for itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from typing import Annotated, Self
 
 from fastapi import APIRouter
@@ -66,10 +67,18 @@ class ActDone(BaseModel):
     problem: ActProblem | None
 
 
+class UndoOut(BaseModel):
+    """The cameras of which the act `undo` takes back what was done, and until when it is taken."""
+
+    ids: list[str]
+    until: datetime
+
+
 class ActsOut(BaseModel):
-    """One answer an id, in the order of the ids."""
+    """One answer an id, in the order of the ids; `undo` where any of it can be taken back."""
 
     items: list[ActDone]
+    undo: UndoOut | None
 
 
 router = APIRouter(tags=["alerts"], route_class=NamingRoute)
@@ -81,18 +90,41 @@ def act(body: ActsBody, state: StateDep, write: WritesDep) -> ActsOut:
 
     `acknowledge`, `silence` and `resolve` take ids of alerts, all others ids of cameras.
     """
+    begun, undoable = datetime.now(UTC), dict[str, datetime]()
 
     def done(one: str) -> ActDone:
         about = one if body.act in _OF_CAMERAS else None
         try:
             with write(about) as session:
                 _DO[body.act](session, state, one, body)
+                mine = _undoable(session, one, body.act, begun)
+            undoable.update(mine)
         except ServiceError as error:  # of this id alone; the others are still to be done
             said = ActProblem(status=error.status, code=error.code, detail=error.detail)
             return ActDone(id=one, problem=said)
         return ActDone(id=one, problem=None)
 
-    return ActsOut(items=[done(one) for one in dict.fromkeys(body.ids)])
+    items = [done(one) for one in dict.fromkeys(body.ids)]
+    until = min(undoable.values(), default=None)
+    return ActsOut(
+        items=items, undo=None if until is None else UndoOut(ids=list(undoable), until=until)
+    )
+
+
+def _undoable(session: Session, one: str, act: Act, begun: datetime) -> dict[str, datetime]:
+    """Until when what was just said of cameras can be taken back, by their ids."""
+    if act not in _ANSWERS:
+        return {}
+    cameras_of: Sequence[str | None] = [one]
+    if act == Act.RESOLVE:
+        record = alerts.show_alert(session, one)
+        cameras_of = record.camera_ids or [record.camera_id]
+    found = {}
+    for camera_id in cameras_of:
+        entry = None if camera_id is None else undo.last_answer(session, camera_id, begun)
+        if camera_id is not None and entry is not None and entry.at >= begun:
+            found[camera_id] = entry.at + undo.UNDO_WITHIN
+    return found
 
 
 def _acknowledge(session: Session, state: AppState, one: str, body: ActsBody) -> None:
@@ -153,4 +185,5 @@ _DO: dict[Act, Callable[[Session, AppState, str, ActsBody], None]] = {
     Act.UNDO: _decide(undo.undo_answer),
     Act.TAG: _tag,
 }
+_ANSWERS = (Act.RESOLVE, Act.PUT_BACK, Act.ACCEPT, Act.RESET)
 _OF_CAMERAS = (Act.MAINTENANCE, Act.PUT_BACK, Act.ACCEPT, Act.RESET, Act.UNDO, Act.TAG)

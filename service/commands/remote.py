@@ -200,7 +200,9 @@ def _waits(alert: dict[str, Any]) -> bool:
 
 
 def _row_of(alert: dict[str, Any]) -> tuple[str, ...]:
-    state = f"seen by {alert['acknowledged_by']}" if alert["acknowledged"] else alert["state"]
+    state = (
+        f"acknowledged by {alert['acknowledged_by']}" if alert["acknowledged"] else alert["state"]
+    )
     opened = datetime.fromisoformat(alert["opened_at"]).astimezone()
     told = (f"{opened:%Y-%m-%d %H:%M}", _whose(alert), alert["kind"], alert["severity"])
     return alert["id"], *told, state, alert["reason"]

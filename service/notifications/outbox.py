@@ -15,7 +15,7 @@ from service.degrees import in_degrees
 from service.enums import DeliveryState, MessageType
 from service.job_queue import JobQueue, queue_of
 from service.store import webhooks
-from service.store.alerts import AlertRecord
+from service.store.alerts import AlertRecord, told_by
 from service.store.webhooks import DeliveryRecord, WebhookRecord
 from service.wording.reasons import in_words
 from service.wording.zones import apply_words
@@ -48,7 +48,7 @@ def queue_alert(
     if record.is_silenced(now) and message not in _TOLD_IN_SILENCE:
         return
     for webhook in webhooks.enabled(session):
-        if webhook.kinds is None or record.kind in webhook.kinds:
+        if webhook.kinds is None or not told_by(record.kind).isdisjoint(webhook.kinds):
             add_delivery(session, webhook, message, body, now, alert_id=record.id)
 
 

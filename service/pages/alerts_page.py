@@ -16,9 +16,11 @@ from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.cameras.status import alert_since
 from service.enums import AlertKind, AlertState, Severity, TokenScope
+from service.pages.bulk import bulk_rule
 from service.store import alerts, fleet, journal
-from service.store.alerts import AlertRecord, answers_of
+from service.store.alerts import AlertRecord
 from service.wording import alerts as alert_words
+from service.wording.acts import ACTS
 from service.wording.camera import fleet_alert_flags
 from service.wording.times import Clock
 
@@ -36,10 +38,14 @@ class AlertRow:
     flags: tuple[str, ...]
 
     @property
-    def outcomes(self) -> str:
-        """What may be answered to it; nothing once it has ended."""
-        firing = self.alert.state == AlertState.FIRING
-        return " ".join(answers_of(self.alert.kind)) if firing else ""
+    def fires(self) -> bool:
+        """True until it has ended."""
+        return self.alert.state == AlertState.FIRING
+
+    @property
+    def answered_apart(self) -> bool:
+        """True if it is answered by itself, and not over or with its group."""
+        return self.fires and self.alert.group_id is None
 
 
 router = APIRouter(include_in_schema=False)
@@ -75,6 +81,8 @@ def show(
         csv=_csv(asked, chosen.state),
         clock=clock,
         words=alert_words,
+        act_words=ACTS,
+        rule=bulk_rule(),
         operates=caller is None or caller.may(TokenScope.OPERATE),
         newest_event=newest,
         waiting=alerts.count_waiting(session, clock.now),
@@ -95,7 +103,10 @@ def _chips(asked: Sequence[tuple[str, str]]) -> list[list[Chip]]:
     """The choices, in groups: those of kinds add up, of all others one holds."""
     one_of = [
         (("Firing", ()), ("Ended", ("state", AlertState.RESOLVED)), ("All", ("all", "true"))),
-        (("Nobody's", ("acknowledged", "false")), ("Somebody's", ("acknowledged", "true"))),
+        (
+            ("Not acknowledged", ("acknowledged", "false")),
+            ("Acknowledged", ("acknowledged", "true")),
+        ),
         tuple((each.capitalize(), ("severity", each)) for each in Severity),
     ]
     groups = []

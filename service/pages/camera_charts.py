@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 
 from models.geometry.pose import PoseParameters
 from models.quantiles import Z90
+from service.cameras.answers import ANSWERS
 from service.pages.drawings.chart import Mark, Point, Span, TimeAxis, chart_svg
 from service.store import estimates
 from service.store.alerts import AlertRecord
@@ -75,7 +76,7 @@ def draw_charts(history: History, clock: Clock) -> list[Chart]:
             words=f"{alert_words.entry_words(entry, clock)} {clock.when(entry.at)}",
         )
         for entry in history.acts
-        if entry.what in alert_words.ANSWERED
+        if entry.what in ANSWERS
     ]
     first_s, last_s = history.items[0].to_s, history.items[-1].to_s
     times = TimeAxis.of(first_s, max([last_s, *(mark.at_s for mark in marks)]), clock.zone)

@@ -288,7 +288,7 @@ def _undo(page: CameraPage, caller: Caller | None) -> UndoWords | None:
     return UndoWords(
         by=entry.by,
         who="You" if own else entry.by or "Someone",
-        words=alert_words.ANSWERED[entry.what],
+        words=alert_words.DONE[entry.what],
         at=entry.at,
         until=entry.at + UNDO_WITHIN,
     )

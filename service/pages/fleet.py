@@ -19,6 +19,7 @@ from service.api.schemas import Text
 from service.cameras.reference_views import reference_views
 from service.cameras.status import CameraStatus, alert_since, camera_statuses, waits
 from service.enums import PoseState, TokenScope
+from service.pages.bulk import bulk_rule
 from service.pages.drawings.sparkline import sparkline
 from service.pages.fleet_index import (
     Entry,
@@ -28,6 +29,7 @@ from service.pages.fleet_index import (
     index_document,
 )
 from service.references import drift_limits, wanted_tracks
+from service.reports.handover import Handover, last_handovers
 from service.settings import Settings
 from service.store import alerts, fleet, journal
 from service.store.alerts import AlertRecord
@@ -35,6 +37,7 @@ from service.store.estimates import EstimateRecord
 from service.store.fleet import Label
 from service.store.trainings import TrainingRecord
 from service.wording import alerts as alert_words
+from service.wording.acts import ACTS
 from service.wording.camera import (
     STATES,
     fleet_alert_flags,
@@ -44,6 +47,7 @@ from service.wording.camera import (
 from service.wording.reasons import group_in_words
 from service.wording.times import Clock
 
+_HANDOVERS = 20  # the newest: what nobody has taken is among them
 _HISTORY = 24  # estimates of a sparkline
 PAGE = 50  # rows at once: more are neither read nor laid out in no time
 # No reference can be learned there yet.
@@ -229,6 +233,7 @@ def show(
         rows=list_fleet(session, state.settings, [entry.id for entry in found[:PAGE]]),
         page_size=PAGE,
         groups=groups,
+        handovers=_handovers(session),
         **_words(request, state),
     )
 
@@ -255,10 +260,19 @@ def rows(
 
 @router.get("/ui/fleet/banners")
 def banners(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
-    """The alerts that blame trackers."""
+    """The handovers that nobody has taken, and the alerts that blame trackers."""
     return render(
-        request, "_fleet_banners.html", groups=list_groups(session), **_words(request, state)
+        request,
+        "_fleet_banners.html",
+        groups=list_groups(session),
+        handovers=_handovers(session),
+        **_words(request, state),
     )
+
+
+def _handovers(session: Session) -> list[Handover]:
+    """Those of the last that nobody has taken over, the oldest first."""
+    return [each for each in last_handovers(session, _HANDOVERS) if each.taken_at is None][::-1]
 
 
 def _words(request: Request, state: AppState) -> dict[str, Any]:
@@ -268,6 +282,8 @@ def _words(request: Request, state: AppState) -> dict[str, Any]:
         registers=caller is None or caller.may(TokenScope.ADMIN),
         operates=caller is None or caller.may(TokenScope.OPERATE),
         words=alert_words,
+        act_words=ACTS,
+        rule=bulk_rule(),
         clock=Clock(now=datetime.now(UTC), zone=state.settings.zone),
         states=STATES,
         in_words=group_in_words,

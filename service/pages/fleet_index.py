@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from service.cameras.status import CameraStatus, camera_statuses, waits
 from service.enums import AlertKind, PoseState, Severity
+from service.pages.bulk import kinds_of
 from service.settings import Settings
 from service.store import fleet
 from service.store.fleet import Label
@@ -34,7 +35,7 @@ class Entry:
     """A camera of the index: its `rank` is 0 where it needs a person at once, 9 not at all.
 
     `waiting` are its alerts that nobody has taken up. `words` is what else it is found by: its
-    source of tracks, who has seen its alerts.
+    source of tracks, who has seen its alerts. `kinds` say what can be done with it (bulk.py).
     """
 
     id: str
@@ -45,6 +46,7 @@ class Entry:
     since_s: int
     last_s: int | None
     words: str
+    kinds: str
 
     @property
     def order(self) -> tuple[int, int, str, str]:
@@ -57,7 +59,7 @@ class Entry:
         """As the page's script reads it (fleet.js)."""
         return [
             *(self.id, self.label.name, self.shown, self.rank, self.waiting, self.since_s),
-            *(self.last_s, self.words, self.label.place),
+            *(self.last_s, self.words, self.kinds, self.label.place),
         ]
 
     def fits(
@@ -95,6 +97,7 @@ def entry_of(status: CameraStatus, label: Label, now: datetime) -> Entry:
         since_s=int(status.since.timestamp()),
         last_s=None if status.last_track_s is None else int(status.last_track_s),
         words=" ".join([*([source] if source else []), *seen_by]),
+        kinds=kinds_of(status.alerts),
     )
 
 

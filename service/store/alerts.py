@@ -119,6 +119,12 @@ _OF_POSE = (Answer.PUT_BACK, Answer.ACCEPTED, Answer.FALSE_ALARM)
 _OF_OTHERS = (Answer.MENDED, Answer.FALSE_ALARM)
 # By which a person says that a camera is at its prior pose, and its clock is right.
 ANSWERS = (Outcome.PUT_BACK, Outcome.MENDED, Outcome.RELEARNED, Outcome.FALSE_ALARM)
+# Of a group's kind, those of the alerts that it is made of.
+MEMBER_KINDS = {
+    AlertKind.MANY_MOVED: MOVED_KINDS,
+    AlertKind.MANY_SILENT: (AlertKind.NO_DATA,),
+}
+MEMBER = "member"  # instead of its kind, of an alert that is answered with its group
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
 
 # Built once: each reconcile of a camera asks for it.
@@ -132,6 +138,11 @@ _FIRING = select(AlertRecord).where(
 def answers_of(kind: AlertKind) -> tuple[Answer, ...]:
     """What a person may say came of an alert: of a clock or a tracker no pose can be accepted."""
     return _OF_POSE if kind in (AlertKind.DRIFT, AlertKind.UNSURE) else _OF_OTHERS
+
+
+def told_by(kind: AlertKind) -> set[AlertKind]:
+    """Kinds: who hears of any of them hears of alerts of this one; a group speaks for some."""
+    return {kind, *MEMBER_KINDS.get(kind, ())}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,6 +254,17 @@ def unheeded(session: Session, since: datetime, now: datetime) -> Sequence[Alert
             AlertRecord.escalated_at.is_(None), AlertRecord.opened_at <= since, ~told_anew
         )
     ).all()
+
+
+def unmailed(session: Session, now: datetime) -> Sequence[AlertRecord]:
+    """Open alerts that were escalated, wait still, and of which no mail has told yet."""
+    mailed = exists().where(
+        ActivityRecord.subject_id == AlertRecord.id,
+        ActivityRecord.what == Activity.ALERT_MAILED,
+        ActivityRecord.at >= AlertRecord.escalated_at,
+    )
+    query = _waiting(now).where(AlertRecord.escalated_at.is_not(None), ~mailed)
+    return session.scalars(query.order_by(AlertRecord.opened_at)).all()
 
 
 def _all_firing(*conditions: ColumnElement[bool]) -> Select[AlertRecord]:

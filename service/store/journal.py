@@ -61,6 +61,7 @@ class ActivityRecord(Record):
     __table_args__ = (
         Index(None, "camera_id", "id"),
         Index(None, "subject_id", "id"),
+        Index(None, "what", "id"),
         Index(None, "at"),
         {"sqlite_autoincrement": True},  # an id is never given twice
     )
@@ -149,8 +150,25 @@ def newest_of(
 
 def newest_of_kind(session: Session, what: Activity) -> ActivityRecord | None:
     """The newest entry of a kind; None where there is none."""
+    return next(iter(newest_entries(session, what, 1)), None)
+
+
+def newest_entries(session: Session, what: Activity, limit: int) -> Sequence[ActivityRecord]:
+    """The newest entries of a kind, newest first."""
     query = select(ActivityRecord).where(ActivityRecord.what == what)
-    return session.scalars(query.order_by(ActivityRecord.id.desc()).limit(1)).first()
+    return session.scalars(query.order_by(ActivityRecord.id.desc()).limit(limit)).all()
+
+
+def entries_about(
+    session: Session, what: Activity, subject_ids: Collection[str | None]
+) -> dict[str | None, ActivityRecord]:
+    """The entry of a kind about each of some subjects that has one."""
+    if not subject_ids:
+        return {}
+    query = select(ActivityRecord).where(
+        ActivityRecord.what == what, ActivityRecord.subject_id.in_(subject_ids)
+    )
+    return {entry.subject_id: entry for entry in session.scalars(query)}
 
 
 def activity_of_subject(session: Session, subject_id: str) -> Sequence[ActivityRecord]:

@@ -20,9 +20,9 @@ from sqlalchemy import (
 from sqlalchemy.orm import Mapped, Session, aliased, mapped_column, relationship, selectinload
 
 from models.reasons import Reason
-from service.enums import AlertState, DeliveryState, MessageType, WebhookFormat
+from service.enums import AlertKind, AlertState, DeliveryState, MessageType, WebhookFormat
 from service.reasons import Reasons
-from service.store.alerts import AlertRecord
+from service.store.alerts import AlertRecord, told_by
 from service.store.record import Record, delete_some
 
 
@@ -255,7 +255,9 @@ def audible(session: Session, kinds: Sequence[str] | None, now: datetime) -> Seq
         or_(AlertRecord.silenced_until.is_(None), AlertRecord.silenced_until <= now),
     )
     if kinds is not None:
-        query = query.where(AlertRecord.kind.in_(kinds))
+        query = query.where(
+            AlertRecord.kind.in_([k for k in AlertKind if not told_by(k).isdisjoint(kinds)])
+        )
     return session.scalars(query.order_by(AlertRecord.opened_at)).all()
 
 

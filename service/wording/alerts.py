@@ -9,6 +9,7 @@ from service.enums import Activity, AlertKind, AlertSource, Answer, Outcome
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.journal import ActivityRecord
+from service.wording.acts import ACTS
 from service.wording.moves import NAMES, offset_words
 from service.wording.reasons import in_words, percent
 from service.wording.times import Clock, duration
@@ -21,6 +22,8 @@ KINDS = {
     AlertKind.STALE: "Its estimate fails or lacks tracks",
     AlertKind.TRACKER: "Another tracker posts",
     AlertKind.PICTURE: "Its picture is not as it should be",
+    AlertKind.MANY_MOVED: "Cameras of a tracker moved together",
+    AlertKind.MANY_SILENT: "Cameras of a tracker fell silent together",
 }
 # The same in a word, for a badge.
 BADGES = {
@@ -31,10 +34,12 @@ BADGES = {
     AlertKind.STALE: "Not looked at",
     AlertKind.TRACKER: "Tracker",
     AlertKind.PICTURE: "Picture",
+    AlertKind.MANY_MOVED: "Many moved",
+    AlertKind.MANY_SILENT: "Many silent",
 }
 OUTCOMES = {
     Outcome.PUT_BACK: "put back",
-    Outcome.ACCEPTED: "new pose accepted",
+    Outcome.ACCEPTED: "new aim kept",
     Outcome.MENDED: "put right",
     Outcome.RELEARNED: "learned anew",
     Outcome.FALSE_ALARM: "false alarm",
@@ -42,52 +47,41 @@ OUTCOMES = {
     Outcome.CAMERA_REMOVED: "camera removed",
 }
 _OF_POSE = {
-    Answer.PUT_BACK: (
-        "It was put back",
-        "It stands as it did. What was learned there stays; the next people tell.",
-    ),
-    Answer.ACCEPTED: (
-        "Keep the new aim",
-        "Where it looks now is right from now on, and is learned anew.",
-    ),
-    Answer.FALSE_ALARM: ("It did not move", "A false alarm. The next people tell."),
+    Answer.PUT_BACK: "It stands as it did. What was learned there stays; the next people tell.",
+    Answer.ACCEPTED: "Where it looks now is right from now on, and is learned anew.",
+    Answer.FALSE_ALARM: "It did not move. The next people tell.",
 }
 _AGAIN = "Should it go on, another alert opens."
-# What a person may answer: the button, and what it comes to.
+# What a person may answer, and what it comes to.
 _ANSWERS = {
     AlertKind.DRIFT: _OF_POSE,
     AlertKind.UNSURE: _OF_POSE,
     AlertKind.CLOCK: {
-        Answer.MENDED: (
-            "The clock is right again",
-            "Clock or frame rate was put right; the next people tell.",
-        ),
-        Answer.FALSE_ALARM: ("Nothing was wrong", "A false alarm. The next people tell."),
+        Answer.MENDED: "Clock and frame rate are as they should be; the next people tell.",
+        Answer.FALSE_ALARM: "Nothing was wrong. The next people tell.",
     },
     AlertKind.NO_DATA: {
-        Answer.MENDED: ("It works again", f"Camera or tracker was repaired. {_AGAIN}"),
-        Answer.FALSE_ALARM: ("Nobody was to come", "Such a silence counts as usual from now on."),
+        Answer.MENDED: f"Camera or tracker was repaired. {_AGAIN}",
+        Answer.FALSE_ALARM: "Nobody was to come: such a silence counts as usual from now on.",
     },
-    AlertKind.STALE: {
-        Answer.MENDED: ("It works again", _AGAIN),
-        Answer.FALSE_ALARM: ("Nothing was wrong", _AGAIN),
-    },
+    AlertKind.STALE: {Answer.MENDED: _AGAIN, Answer.FALSE_ALARM: f"Nothing was wrong. {_AGAIN}"},
     AlertKind.TRACKER: {
-        Answer.MENDED: ("The other one is off", "Only one tracker posts from now on."),
-        Answer.FALSE_ALARM: ("Both may post", "The one that counts counts; no alert of the other."),
+        Answer.MENDED: "The other one is off: only one tracker posts from now on.",
+        Answer.FALSE_ALARM: "Both may post: the one that counts counts, without an alert.",
     },
     AlertKind.PICTURE: {
-        Answer.MENDED: ("It sees again", f"The view is free and sharp. {_AGAIN}"),
-        Answer.FALSE_ALARM: ("Nothing was wrong", "Later pictures are compared with the next one."),
+        Answer.MENDED: f"The view is free and sharp. {_AGAIN}",
+        Answer.FALSE_ALARM: "Nothing was wrong. Later pictures are compared with the next one.",
     },
-}
-# After "You" or a name, of an answer that can be taken back.
-ANSWERED = {
-    Activity.POSE_ACCEPTED: "kept the new aim",
-    Activity.POSE_PUT_BACK: "said that it was put back",
-    Activity.POSE_MENDED: "said that its clock is right again",
-    Activity.POSE_FALSE_ALARM: "called this a false alarm",
-    Activity.REFERENCE_RESET: "had it learned anew",
+    AlertKind.MANY_MOVED: {
+        Answer.MENDED: "The tracker, its clock or frame rate is as it should be. At each of its "
+        "cameras the next people tell.",
+        Answer.FALSE_ALARM: "Nothing was wrong. At each of its cameras the next people tell.",
+    },
+    AlertKind.MANY_SILENT: {
+        Answer.MENDED: f"The tracker was repaired. {_AGAIN}",
+        Answer.FALSE_ALARM: "Nobody was to come before any of its cameras.",
+    },
 }
 # Notes on alerts that ended by themselves.
 TRACKS_COME_AGAIN = "tracks come again"
@@ -95,19 +89,19 @@ ESTIMATED_AGAIN = "it is looked at again"
 ONE_SOURCE_POSTS = "only one source posts"
 # A test alert's description.
 TEST_ENDS = "This is a test of surefoot; it ends by itself."
-# By a person; of those that the service does by itself, what happened.
-_DONE = {
+# By a person, after their name; of those that the service does by itself, what happened.
+DONE = {
     Activity.CAMERA_REGISTERED: "registered the camera",
     Activity.CAMERA_CHANGED: "changed what is said of the camera",
     Activity.CAMERA_DESCRIBED: "changed its {fields}",
     Activity.CAMERA_REMOVED: "removed the camera",
     Activity.POSE_AGREED: "agreed to the pose that people told",
-    Activity.POSE_ACCEPTED: "accepted the new pose as the prior pose",
-    Activity.POSE_PUT_BACK: "said that the camera is back at its prior pose",
-    Activity.POSE_MENDED: "said that the clock is mended",
-    Activity.POSE_FALSE_ALARM: "said that the camera never moved",
-    Activity.POSE_UNDONE: "took the last answer back",
-    Activity.REFERENCE_RESET: "had the camera learned anew at its prior pose",
+    Activity.POSE_ACCEPTED: "kept the new aim",
+    Activity.POSE_PUT_BACK: "said that it was put back",
+    Activity.POSE_MENDED: "said that it was put right",
+    Activity.POSE_FALSE_ALARM: "called it a false alarm",
+    Activity.POSE_UNDONE: "undid the last answer",
+    Activity.REFERENCE_RESET: "had it learned anew at the old aim",
     Activity.SOURCE_USED: "said whose tracks count; the reference is learned anew",
     Activity.SOURCE_REMOVED: "removed a source of tracks with its tracks",
     Activity.ALERT_ACKNOWLEDGED: "acknowledged {alert}",
@@ -125,11 +119,14 @@ _DONE = {
     Activity.PLAN_KEPT: "put a plan of the site",
     Activity.PLAN_REMOVED: "deleted the plan of the site",
     Activity.ZONES_DRAWN: "drew the zones anew",
+    Activity.HANDOVER_GIVEN: "handed over",
+    Activity.HANDOVER_TAKEN: "took over",
 }
 _HAPPENED = {
     Activity.ALERT_OPENED: "Alert: {kind}",
     Activity.ALERT_GREW: "It grew: {alert} is critical now",
     Activity.ALERT_ESCALATED: "Nobody took up {alert}: it was told once more",
+    Activity.ALERT_MAILED: "A mail told that nobody took up {alert}",
     Activity.REFERENCE_LEARNED: "The reference was learned",
     Activity.MAINTENANCE_OVER: "The maintenance is over",
     Activity.TRAINING_SUCCEEDED: "A training ended: its model is in use",
@@ -156,16 +153,17 @@ class EvidenceRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerWords:
-    """An answer to an alert as its button says it, and what it comes to."""
+    """An answer to an alert as its button says it, what it comes to, and once it is `done`."""
 
     outcome: Answer
     label: str
     consequence: str
+    done: str
 
 
 def alert_line(alert: AlertRecord) -> str:
     """What an alert tells of, in a line of a list."""
-    if alert.kind == AlertKind.CLOCK and alert.camera_id is not None:
+    if alert.kind == AlertKind.CLOCK:
         return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
     if alert.kind == AlertKind.UNSURE:
         return "people walk on none of the learned paths: turned far, or they walk elsewhere"
@@ -191,7 +189,7 @@ def done_words(alert: AlertRecord, now: datetime) -> str:
         by = f" by {alert.resolved_by}" if alert.resolved_by else ""
         return f"{OUTCOMES[alert.outcome]}{by} after {after(alert.resolved_at)}"
     if alert.acknowledged_at is not None:
-        seen = f"seen by {alert.acknowledged_by} after {after(alert.acknowledged_at)}"
+        seen = f"acknowledged by {alert.acknowledged_by} after {after(alert.acknowledged_at)}"
         return f"{seen}, open for {after(now)}"
     if alert.is_silenced(now):
         return f"silenced by {alert.silenced_by}, open for {after(now)}"
@@ -201,8 +199,10 @@ def done_words(alert: AlertRecord, now: datetime) -> str:
 def answers(kind: AlertKind) -> list[AnswerWords]:
     """What a person may answer to an alert of a kind, that it was real first."""
     return [
-        AnswerWords(outcome=answer, label=label, consequence=consequence)
-        for answer, (label, consequence) in _ANSWERS[kind].items()
+        AnswerWords(
+            outcome=answer, label=ACTS[answer].one, consequence=comes_to, done=ACTS[answer].done
+        )
+        for answer, comes_to in _ANSWERS[kind].items()
     ]
 
 
@@ -273,6 +273,16 @@ def alert_summary(
     return f"{kind.replace('_', ' ')}: {whose}"
 
 
+def is_act(entry: ActivityRecord) -> bool:
+    """True of what a person did to cameras and alerts."""
+    return entry.what in DONE and not _by_itself(entry)
+
+
+def _by_itself(entry: ActivityRecord) -> bool:
+    nobody = entry.by is None and entry.outcome in (None, *_UNASKED)
+    return entry.what in _BY_ITSELF and nobody
+
+
 def entry_words(entry: ActivityRecord, clock: Clock) -> str:
     """A sentence without the time: who did what."""
     kind = "" if entry.kind is None else KINDS[entry.kind].lower()
@@ -285,9 +295,9 @@ def entry_words(entry: ActivityRecord, clock: Clock) -> str:
     }
     if entry.what in _HAPPENED:
         text = _HAPPENED[entry.what]
-    elif entry.what in _BY_ITSELF and entry.by is None and entry.outcome in (None, *_UNASKED):
+    elif _by_itself(entry):
         text = _BY_ITSELF[entry.what]
     else:
-        text = f"{{who}} {_DONE.get(entry.what, entry.what)}"
+        text = f"{{who}} {DONE.get(entry.what, entry.what)}"
     sentence = f"{text.format(who=entry.by or 'Someone', **words)}."
     return f"{sentence} {entry.note}" if entry.note else sentence

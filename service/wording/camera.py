@@ -257,7 +257,7 @@ def fleet_alert_flags(alert: AlertRecord, now: datetime) -> tuple[str, ...]:
     """The flags of an alert in the fleet."""
     flags = []
     if alert.acknowledged_by is not None:
-        flags.append(f"seen by {alert.acknowledged_by}")
+        flags.append(f"acknowledged by {alert.acknowledged_by}")
     elif alert.escalated_at is not None and alert.state == AlertState.FIRING:
         waits_s = (now - alert.opened_at).total_seconds()
         flags.append(f"escalated: nobody took it up in {duration(waits_s)}")

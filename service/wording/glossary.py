@@ -47,11 +47,12 @@ WORDS = {
     "What is done": {
         "It was put back": "The camera was turned to where it had been. What was learned stays.",
         "Keep the new aim": "Where it looks now is right. That is learned anew.",
-        "It did not move": "A false alarm. The next people tell.",
+        "It was put right": "Clock, tracker or view is as it should be. The next people tell.",
         "Acknowledge": "Tell the others that you look after it. The alert stays open.",
         "Silence": "Nobody is woken by the alert until then. It stays open.",
         "Maintenance": "Somebody is at the camera: nothing is judged or learned until they left.",
-        "Learn it anew": "The camera stands, but other people walk there now, or elsewhere.",
+        "Learn anew at the old aim": "The camera stands, but other people walk there now, or "
+        "elsewhere.",
         "Site and tags": "Where a camera belongs, such as campus/north/gate, and words by which "
         "you find it, such as outdoor.",
     },

@@ -35,6 +35,7 @@ def test_twelve_cameras_take_three_clicks_and_it_stays_live(page, server):
     expect(page.locator("#chosen")).to_have_text("13 alerts")
     put_back = page.get_by_role("button", name="They were put back")
     expect(put_back).to_be_hidden()  # of a clock nobody says that
+    expect(page.locator("#mixed")).to_have_text("1 of 13 is a clock fault: choose it apart.")
     shoot(page, "alerts-chosen")
     page.get_by_label("Choose clock").uncheck()
     assert axe(page) == []
@@ -49,7 +50,9 @@ def test_twelve_cameras_take_three_clicks_and_it_stays_live(page, server):
     put_back.click()
     expect(page.locator(".alert-row")).to_have_count(1)
     expect(page.locator("#bulk")).to_be_hidden()
-    page.get_by_role("button", name="The clock is right again").click()
+    expect(page.locator("#undo")).to_contain_text("Put back: 12 cameras.")
+    shoot(page, "alerts-undo-phone")
+    page.get_by_role("button", name="It was put right").click()
     expect(page.locator("#rows")).to_contain_text("No alert is like that")
     found = server.http.get("/alerts").json()["items"]
     assert {(a["outcome"], a["resolved_by"]) for a in found} == {
@@ -70,12 +73,12 @@ def test_a_second_click_at_one_place_answers_no_other_alert(page, server):
     page.goto("/ui/alerts")
     page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
     rows = page.locator(".alert-row")
-    box = rows.first.get_by_role("button", name="It did not move").bounding_box()
+    box = rows.first.get_by_role("button", name="False alarm").bounding_box()
     at = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.evaluate(AGAIN, at)
     page.mouse.click(*at)
     expect(rows).to_have_count(1)
-    assert page.evaluate("window.under").strip() == "It did not move"
+    assert page.evaluate("window.under").strip() == "False alarm"
     page.wait_for_timeout(500)
     found = server.http.get("/alerts").json()["items"]
     assert sorted(a["outcome"] or "" for a in found) == ["", "false_alarm"]
@@ -83,3 +86,67 @@ def test_a_second_click_at_one_place_answers_no_other_alert(page, server):
     page.wait_for_timeout(1000)
     page.mouse.click(*at)
     expect(page.locator("#rows")).to_contain_text("No alert is like that")
+
+
+@pytest.mark.parametrize(
+    ("path", "words"), [("/", "To the cameras"), ("/ui/alerts", "To the alerts")]
+)
+def test_a_keyboard_is_at_the_first_row_after_three_stops_and_never_lost(page, server, path, words):
+    """It took 15; and whoever answered an alert began at the page's head again."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    fleet = Fleet(server.settings)
+    for n in range(3):
+        fleet.add(f"c{n}", f"Corner {n}", tilt_deg=3.0)
+        fleet.knock(f"c{n}")
+    fleet.close()
+    page.goto(path)
+    page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
+    page.get_by_text("Live").wait_for()
+    focused = page.locator(":focus")
+    page.keyboard.press("Tab")
+    expect(focused).to_have_text(words)
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    expect(focused).to_have_class("pick")
+    row = page.locator("li.row, li.alert-row").first
+    expect(row.locator(".pick")).to_be_focused()
+    # A dialog that is called off gives the focus back.
+    page.keyboard.press("Space")
+    silence = page.locator("#bulk").get_by_role("button", name="Silence…")
+    silence.focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_label("1 hour")).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(silence).to_be_focused()
+    page.locator("#bulk").get_by_role("button", name="They were put back").focus()
+    page.keyboard.press("Enter")
+    undo = page.locator("#undo").get_by_role("button", name="Undo")
+    expect(undo).to_be_visible()
+    expect(page.locator("#rows")).to_be_focused()
+    undo.focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#announce")).to_contain_text("Undone")
+    expect(page.locator("#rows")).to_be_focused()
+    if path == "/":
+        return
+    # A row that was answered goes: the next one has the focus.
+    expect(page.locator(".alert-row")).to_have_count(3)
+    second = page.locator(".alert-row").nth(1).get_attribute("id")
+    page.locator(".alert-row").first.get_by_role("button", name="False alarm").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator(".alert-row")).to_have_count(2)
+    expect(page.locator(f"#{second} .pick")).to_be_focused()
+
+
+def test_what_has_ended_offers_no_choice_of_all(page, server):
+    """It was offered, and there was nothing to choose."""
+    fleet = Fleet(server.settings)
+    fleet.add("c0", tilt_deg=3.0)
+    alert = fleet.knock("c0")
+    fleet.close()
+    page.goto("/ui/alerts")
+    assert page.get_by_label("All that are shown").count() == 1
+    server.http.post(f"/alerts/{alert}/resolve", json={"outcome": "put_back"}).raise_for_status()
+    page.goto("/ui/alerts?state=resolved")
+    assert page.locator(".alert-row").count() == 1
+    assert page.get_by_label("All that are shown").count() == 0

@@ -24,7 +24,7 @@ def test_an_empty_fleet_is_sound(page, scheme):
 
 
 def test_the_first_stop_of_the_keyboard_skips_the_head(page):
-    page.goto("/")
+    page.goto("/ui/health")
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
     assert page.evaluate("document.activeElement.id") == "main"

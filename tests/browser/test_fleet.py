@@ -55,7 +55,7 @@ def test_an_alert_comes_up_by_itself(page, fleet, server):
     page.evaluate("document.getElementById('announce').textContent = ''")
     (alert,) = server.http.get("/alerts").json()["items"]
     server.http.post(f"/alerts/{alert['id']}/acknowledge", json={"by": "Ada"}).raise_for_status()
-    page.get_by_text("seen by Ada").wait_for()
+    page.get_by_text("acknowledged by Ada").wait_for()
     assert page.title().startswith("Cameras")  # the number fell, and nothing was called out
     assert page.locator("#announce").inner_text() == ""
 
@@ -264,3 +264,55 @@ def test_cameras_that_nobody_posts_for_are_found_by_their_own_filter(page, fleet
     assert row.locator("progress").count() == 0
     assert axe(page) == []
     shoot(page, "fleet-unconnected")
+
+
+def test_many_are_answered_at_once_said_how_many_and_undone(page, fleet, server):
+    """The toast said "Noted." and had no way back; two clock faults were offered "put back"."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    for n in range(6):
+        fleet.add(f"c{n}", f"Corner {n}", tilt_deg=3.0)
+        fleet.knock(f"c{n}")
+    for n in range(2):
+        fleet.add(f"clock{n}", f"Clock {n}", tilt_deg=3.0)
+        fleet.knock(f"clock{n}", kind="clock")
+    fleet.add("still", "Still")
+    page.goto("/")
+    page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
+    page.get_by_text("Live").wait_for()
+    put_back = page.get_by_role("button", name="They were put back")
+    mixed, undo = page.locator("#mixed"), page.locator("#undo")
+    for n in range(2):
+        page.get_by_label(f"Choose Clock {n}").check()
+    expect(put_back).to_be_hidden()
+    expect(page.get_by_role("button", name="They were put right")).to_be_visible()
+    expect(mixed).to_have_text("")
+    page.get_by_label("Choose all that are found").check()
+    expect(put_back).to_be_hidden()
+    expect(mixed).to_have_text("2 of 9 are clock faults, 1 has no open alert: choose them apart.")
+    expect(page.get_by_role("button", name="Plan maintenance…")).to_be_visible()
+    shoot(page, "fleet-mixed")
+    for name in ("Clock 0", "Clock 1", "Still"):
+        page.get_by_label(f"Choose {name}").uncheck()
+    expect(mixed).to_have_text("")
+    # Two of them are answered by somebody else before the click.
+    page.route("**/ui/fleet/**", lambda route: route.abort())
+    ids = [
+        a["id"]
+        for a in server.http.get("/alerts").json()["items"]
+        if a["camera_id"] in ("c0", "c1")
+    ]
+    body = {"ids": ids, "act": "resolve", "outcome": "false_alarm", "by": "Bo"}
+    server.http.post("/acts", json=body).raise_for_status()
+    put_back.click()
+    expect(undo).to_contain_text("Put back: 4 of 6 cameras; 2 were answered meanwhile.")
+    page.unroute("**/ui/fleet/**")
+    assert axe(page) == []
+    shoot(page, "fleet-undo")
+    page.set_viewport_size({"width": 390, "height": 844})
+    shoot(page, "fleet-undo-phone")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    undo.get_by_role("button", name="Undo").click()
+    expect(page.locator("#announce")).to_have_text("Undone: 4 cameras.")
+    expect(undo).to_have_text("")
+    found = server.http.get("/alerts", params={"state": "firing", "kind": "drift"}).json()["items"]
+    assert {a["camera_id"] for a in found} == {"c2", "c3", "c4", "c5"}

@@ -28,7 +28,7 @@ def test_a_wall_says_what_needs_a_person_and_that_it_stopped(page, server):
     expect(page).to_have_title("(4) Wall · surefoot")
     rows = page.locator("#wall li").all_text_contents()
     assert "Clock" in rows[3]  # a warning after what is critical, then what Ines looks after
-    assert "seen by Ines" in rows[4]
+    assert "acknowledged by Ines" in rows[4]
     assert re.fullmatch(r"As of \d\d:\d\d:\d\d, \d+ s ago", page.locator("#age").text_content())
     assert axe(page) == []
     for width, height in ((3840, 2160), (1920, 1080), (1280, 720), (390, 844)):

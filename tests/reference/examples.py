@@ -45,7 +45,7 @@ _LONGEST_TEXT = 40  # lines
 # What depends on how fast this machine is.
 _MEASURED = {
     **{"worker_silent_s": 1.2, "queue_lag_s": 0.4, "taken_up_after_s": 660.0},
-    "done": "seen by Ada after 11 minutes, open for 2 hours",
+    "done": "acknowledged by Ada after 11 minutes, open for 2 hours",
 }
 
 Examples = dict[str, Any]
@@ -348,6 +348,11 @@ def _others(run: _Run) -> None:
         {"name": "gate tracker", "scopes": ["ingest"], "cameras": ["corner"], "expires_at": year},
     )
     run.ask("GET", "/tokens")
+    shift = {"since": (run.begun - timedelta(hours=8)).isoformat(), "note": "gate 3 is repaired"}
+    given = run.ask("POST", "/handovers", shift | {"by": "Ada"})
+    path = "/handovers/{handover_id}/take"
+    run.ask("POST", path, {"by": "Bo"}, handover_id=given["id"])
+    run.ask("GET", "/handovers")
     run.ask("GET", "/activity")
     run.schemas["ActivityPage"]["items"] = run.schemas["ActivityPage"]["items"][:2]
     run.ask_for("application/x-ndjson", "/activity", {"limit": 2})

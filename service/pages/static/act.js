@@ -114,6 +114,9 @@ export async function guarded(button, what) {
     if (button) button.disabled = false;
     // What is disabled loses the focus, and so would who uses a keyboard.
     const held = document.activeElement;
-    if (button?.isConnected && (held === document.body || held.closest("dialog:not([open])"))) button.focus();
+    const lost = () => document.activeElement === document.body;
+    if (button?.isConnected && (lost() || held.closest("dialog:not([open])"))) button.focus();
+    // Nor is it with what the act has taken away.
+    if (lost()) (document.getElementById("rows") ?? document.getElementById("main")).focus({ preventScroll: true });
   }
 }

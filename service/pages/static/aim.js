@@ -58,7 +58,7 @@ done.addEventListener("click", () =>
   guarded(done, async () => {
     const note = last?.right_deg == null ? "" : `aimed: ${last.good ? "within 0.2°" : `${inWords(last)} was left`}`;
     await call("POST", `${path}/pose/put-back`, note ? { note } : {});
-    announce("It is put back. The next people, or pictures, tell.");
+    announce("Put back. The next people, or pictures, tell.");
     location.assign(`/ui${path}`);
   }),
 );

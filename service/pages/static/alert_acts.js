@@ -16,10 +16,10 @@ export async function done(words, what) {
 }
 
 export const ALERT_ACTS = {
-  answer({ alert, outcome }) {
+  answer({ alert, outcome, done: word }) {
     const note = document.getElementById(`note-${alert}`)?.value.trim();
     const body = { outcome, ...(note && { note }) };
-    return done("Noted.", signed("POST", path(alert, "resolve"), body));
+    return done(`${word}.`, signed("POST", path(alert, "resolve"), body));
   },
 
   acknowledge({ alert }) {
@@ -46,12 +46,12 @@ export function silenceOf({ how, until, reason }) {
   return { until: ends, ...(reason && { reason }) };
 }
 
-/** Ask when somebody is at the camera, or cameras, and send it. */
+/** Ask when somebody is at the camera, or cameras, and send it, which says what was done. */
 export function planMaintenance(send) {
   return ask("maintain-dialog", {
     send: ({ from, to, reason }) => {
       const times = { to: instant(to), ...(from && { from: instant(from) }) };
-      return done("Maintenance is planned.", send({ ...times, ...(reason && { reason }) }));
+      return send({ ...times, ...(reason && { reason }) });
     },
   });
 }

@@ -1,9 +1,8 @@
 // All alerts: answered in their lines, or many at once; what happens is fetched anew.
 
 import { announce, guarded } from "./act.js";
-import { ALERT_ACTS, listen, planMaintenance, silenceOf } from "./alert_acts.js";
-import { actOn } from "./bulk_acts.js";
-import { ask } from "./dialogs.js";
+import { ALERT_ACTS, listen } from "./alert_acts.js";
+import { answer, offer as offerFor, withMany } from "./bulk_acts.js";
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
 
@@ -12,16 +11,13 @@ const bulk = document.getElementById("bulk");
 
 const picked = () => [...list.querySelectorAll(".pick:checked")].map((box) => box.closest("li"));
 
+const itemOf = (row) => ({ ...row.dataset, alert: row.dataset.id, name: row.querySelector(".who").textContent });
+
 /** Offer what can be done with all that are chosen. */
 function offer() {
   if (!bulk) return;
   const rows = picked();
-  bulk.hidden = !rows.length;
-  document.getElementById("chosen").textContent = rows.length === 1 ? "1 alert" : `${rows.length} alerts`;
-  for (const button of bulk.querySelectorAll("[data-outcome]")) {
-    button.hidden = !rows.every((row) => row.dataset.outcomes.split(" ").includes(button.dataset.outcome));
-  }
-  bulk.querySelector('[data-bulk="maintenance"]').hidden = !rows.every((row) => row.dataset.camera);
+  offerFor(bulk, rows.map(itemOf), "alert");
   const all = document.getElementById("all");
   const boxes = list.querySelectorAll(".pick").length;
   if (all) all.checked = boxes > 0 && rows.length === boxes;
@@ -33,7 +29,9 @@ async function refresh() {
   if (!answer.ok || answer.redirected) return;
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
   const kept = new Set(picked().map((row) => row.id));
-  const held = document.activeElement?.closest?.("li.alert-row")?.id;
+  const focused = list.contains(document.activeElement) ? document.activeElement : null;
+  const held = focused?.closest("li.alert-row");
+  const at = [...list.querySelectorAll("li.alert-row")].indexOf(held);
   list.replaceChildren(...fresh.getElementById("alerts").childNodes);
   list.dispatchEvent(new Event("renewed"));
   document.title = fresh.title;
@@ -41,31 +39,25 @@ async function refresh() {
     const box = document.querySelector(`#${CSS.escape(id)} .pick`);
     if (box) box.checked = true;
   }
-  if (held) (document.querySelector(`#${CSS.escape(held)} .pick`) ?? document.getElementById("main")).focus({ preventScroll: true });
+  if (focused) {
+    // On the same alert, or the next one where it has gone.
+    const now = [...list.querySelectorAll("li.alert-row")];
+    const row = held && (now.find(({ id }) => id === held.id) ?? now[Math.min(at, now.length - 1)]);
+    const again = row?.querySelector(".pick, a") ?? document.getElementById(focused.id || "rows");
+    (again ?? document.getElementById("rows")).focus({ preventScroll: true });
+  }
   offer();
 }
 
-const ids = (of) => [...new Set(picked().map(of))];
-
-/** Choose nothing any more, once it was done. */
-async function withAll(act, more, of = (row) => row.dataset.id) {
-  const items = await actOn(act, ids(of), more);
-  if (items === undefined) return undefined;
+function chooseNone() {
   for (const box of list.querySelectorAll(".pick")) box.checked = false;
   offer();
-  return items;
 }
 
-const BULK = {
-  resolve: ({ outcome }) => withAll("resolve", { outcome }),
-  acknowledge: () => withAll("acknowledge"),
-  silence: () => ask("silence-dialog", { send: (said) => withAll("silence", silenceOf(said)) }),
-  maintenance: () => planMaintenance((body) => withAll("maintenance", body, (row) => row.dataset.camera)),
-};
-
+document.getElementById("none-chosen")?.addEventListener("click", chooseNone);
 bulk?.addEventListener("click", (event) => {
   const button = event.target.closest("button[data-bulk]");
-  if (button) guarded(button, () => BULK[button.dataset.bulk](button.dataset));
+  if (button) guarded(button, () => withMany(button.dataset, picked().map(itemOf), chooseNone));
 });
 list.addEventListener("change", (event) => {
   if (event.target.id === "all") {
@@ -73,7 +65,7 @@ list.addEventListener("change", (event) => {
   }
   offer();
 });
-listen(list, ALERT_ACTS);
+listen(list, { ...ALERT_ACTS, answer: (said, button) => answer({ ...said, name: itemOf(button.closest("li")).name }) });
 const again = () => refresh().catch(console.warn);
 document.addEventListener("acted", again);
 subscribe(

@@ -1,44 +1,139 @@
-// One act with many alerts or cameras: POST /acts has an answer for each.
+// One act with one alert or many, or with cameras: POST /acts has an answer for each, and says until
+// when it can be undone. What is offered for what is chosen is the service's rule (pages/bulk.py).
 
-import { Refused, call } from "./act.js";
-import { done, planMaintenance, silenceOf } from "./alert_acts.js";
+import { Refused, announce, call, guarded, plainly } from "./act.js";
+import { planMaintenance, silenceOf } from "./alert_acts.js";
 import { ask, signed, wordsIn } from "./dialogs.js";
 
-const WORDS = {
-  acknowledge: "Acknowledged.",
-  silence: "Silenced.",
-  maintenance: "Maintenance is planned.",
-  tag: "Tagged.",
-  undo: "Taken back.",
-};
 const AT_ONCE = 500;
-const OF_ALERTS = ["acknowledge", "silence"];
+const OF_ALERTS = ["resolve", "acknowledge", "silence"];
+const RULE = JSON.parse(document.getElementById("rule")?.textContent ?? "{}");
 
-/** Do an act with some ids; says how many were refused, and why the first was. */
-export async function actOn(act, ids, more = {}) {
-  const items = [];
-  for (let at = 0; at < ids.length; at += AT_ONCE) {
-    const answer = await signed("POST", "/acts", { ids: ids.slice(at, at + AT_ONCE), act, ...more });
-    if (answer === undefined) return undefined;
-    items.push(...answer.items);
+// As of an alert that has ended (service/alerts/alerts.py).
+const ANSWERED = { status: 409, detail: "state: only a firing alert takes this" };
+
+// --- What is offered -----------------------------------------------------------------------------
+
+/** Offer what all of some items take, each of some `kinds`; says in words what some do not. */
+export function offer(bulk, items, noun) {
+  bulk.hidden = !items.length;
+  document.getElementById("chosen").textContent = counted(items.length, noun);
+  let lost = false;
+  for (const button of bulk.querySelectorAll("[data-takes]")) {
+    const able = items.filter(({ kinds }) => takes(kinds, button.dataset.takes)).length;
+    button.hidden = able < items.length;
+    lost ||= able > 0 && button.hidden;
   }
-  const refused = items.filter(({ problem }) => problem);
-  const said = refused.length ? ` Not done with ${refused.length} of ${ids.length}: ${refused[0].problem.detail}.` : "";
-  return done(`${WORDS[act] ?? "Noted."}${said}`, Promise.resolve(items));
+  document.getElementById("mixed").textContent = lost ? mixture(items) : "";
 }
 
-/** Do an act with cameras, or with the alerts of theirs that fire; asks what it has to know. */
-export async function withMany(act, cameras, after) {
-  const ids = OF_ALERTS.includes(act) ? await alertsOf(cameras) : cameras;
+const takes = (kinds, act) => kinds.split(" ").some((kind) => RULE.kinds[kind].takes.includes(act));
+
+/** "2 of 5 are clock faults: choose them apart." All but the most of a kind are named. */
+function mixture(items) {
+  const counts = new Map();
+  for (const { kinds } of items) counts.set(kinds, (counts.get(kinds) ?? 0) + 1);
+  const [, ...fewer] = [...counts].sort(([, a], [, b]) => b - a);
+  const parts = fewer.map(([kinds, count], at) => {
+    const words = kinds.split(" ").map((kind) => RULE.kinds[kind].words[count === 1 ? 0 : 1]);
+    return `${count}${at ? "" : ` of ${items.length}`} ${words.join(" and ")}`;
+  });
+  return `${parts.join(", ")}: choose ${fewer.length === 1 && fewer[0][1] === 1 ? "it" : "them"} apart.`;
+}
+
+const counted = (count, noun) => (count === 1 ? `1 ${noun}` : `${count} ${noun}s`);
+
+// --- What is done --------------------------------------------------------------------------------
+
+/** Do an act with all that are chosen: items with a `camera`, an `alert` or both, and a `name`. */
+export async function withMany({ bulk: act, takes: wanted }, items, after) {
+  const outcome = act === "resolve" ? { outcome: wanted } : {};
   const send = async (more) => {
-    const items = ids.length ? await actOn(act, ids, more) : await done("No alert of theirs fires.", Promise.resolve([]));
-    if (items !== undefined) after();
-    return items;
+    const targets = OF_ALERTS.includes(act) ? await alertsOf(items, wanted) : items.map((item) => [item.camera, item]);
+    const done = await actOn(act, targets, items, { ...outcome, ...more });
+    if (done !== undefined) after();
+    return done;
   };
   if (act === "silence") return ask("silence-dialog", { send: (said) => send(silenceOf(said)) });
   if (act === "maintenance") return planMaintenance(send);
   if (act === "tag") return ask("tag-dialog", { send: (said) => send(tagsOf(said)) });
   return send();
+}
+
+/** Answer one alert; what is refused is thrown. */
+export function answer({ alert, outcome, name }) {
+  const item = { alert, name };
+  return actOn("resolve", [[alert, item]], [item], { outcome });
+}
+
+/** Do an act with ids, each of an item, and say how many items it was done with. */
+async function actOn(act, targets, items, more = {}) {
+  const ids = [...new Set(targets.map(([id]) => id))];
+  const problems = new Map();
+  let undo = null;
+  for (let at = 0; at < ids.length; at += AT_ONCE) {
+    const told = await signed("POST", "/acts", { ids: ids.slice(at, at + AT_ONCE), act, ...more });
+    if (told === undefined) return undefined;
+    for (const { id, problem } of told.items) problems.set(id, problem);
+    if (told.undo) undo = { ids: [...(undo?.ids ?? []), ...told.undo.ids], until: undo?.until ?? told.undo.until };
+  }
+  const refused = new Map(items.map((item) => [item, ANSWERED])); // unless something of it was still open
+  for (const [, item] of targets) refused.delete(item);
+  for (const [id, item] of targets) if (problems.get(id)) refused.set(item, problems.get(id));
+  if (items.length === 1 && refused.size) throw new Refused(refused.get(items[0]));
+  sayDone(RULE.done[more.outcome ?? act], items, refused, undo);
+  document.dispatchEvent(new CustomEvent("acted"));
+  return items;
+}
+
+/** "Put back: 4 of 6 cameras; 2 were answered meanwhile." */
+function sayDone(word, items, refused, undo) {
+  const cameras = new Set(items.map(({ camera }) => camera).filter(Boolean));
+  const all = (items.length === 1 && items[0].name) || counted(items.length, cameras.size === items.length ? "camera" : "alert");
+  const some = refused.size ? `${items.length - refused.size} of ${all}` : all;
+  const reasons = new Map();
+  for (const problem of refused.values()) {
+    const why = problem.detail.startsWith(ANSWERED.detail) ? "" : plainly(problem.detail);
+    reasons.set(why, (reasons.get(why) ?? 0) + 1);
+  }
+  const others = [...reasons].map(([why, count]) =>
+    why ? `${count} not: ${why.replace(/\.$/, "")}` : `${count} ${count === 1 ? "was" : "were"} answered meanwhile`,
+  );
+  offerUndo(`${word}: ${[some, ...others].join("; ")}.`, undo);
+}
+
+// --- And undone ----------------------------------------------------------------------------------
+
+let over = null;
+
+/** Say what was done, and offer to undo it as long as that is taken; else say it for a while. */
+function offerUndo(words, undo) {
+  if (!undo) {
+    announce(words); // an older one can still be undone
+    return;
+  }
+  const place = document.getElementById("undo");
+  const close = () => place.replaceChildren();
+  clearTimeout(over);
+  announce("");
+  const said = document.createElement("span");
+  said.textContent = words;
+  const items = undo.ids.map((camera) => ({ camera }));
+  const back = async () => {
+    if ((await actOn("undo", items.map((item) => [item.camera, item]), items)) !== undefined) close();
+  };
+  place.replaceChildren(said, buttonOf("Undo", "", back), buttonOf("×", "Close", close));
+  over = setTimeout(close, Date.parse(undo.until) - Date.now());
+}
+
+function buttonOf(words, label, what) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.className = "slim";
+  button.textContent = words;
+  if (label) button.setAttribute("aria-label", label);
+  button.addEventListener("click", () => guarded(button, what));
+  return button;
 }
 
 function tagsOf({ add, remove }) {
@@ -47,8 +142,17 @@ function tagsOf({ add, remove }) {
   throw new Refused({ errors: [{ pointer: "/add", reason: "a word is needed, here or below" }] });
 }
 
-async function alertsOf(cameras) {
-  const { items } = await call("GET", "/alerts?state=firing&limit=1000");
-  const wanted = new Set(cameras);
-  return items.filter(({ camera_id }) => wanted.has(camera_id)).map(({ id }) => id);
+/** The open alerts that take an act, each with the item that it is, or whose camera it is about. */
+async function alertsOf(items, wanted) {
+  if (items[0].alert) return items.map((item) => [item.alert, item]);
+  const of = new Map(items.map((item) => [item.camera, item]));
+  const found = [];
+  for (let cursor = ""; cursor !== null; ) {
+    const page = await call("GET", `/alerts?state=firing&limit=1000${cursor && `&cursor=${encodeURIComponent(cursor)}`}`);
+    found.push(...page.items);
+    cursor = page.next_cursor;
+  }
+  return found
+    .filter((alert) => of.has(alert.camera_id) && !alert.group_id && RULE.kinds[alert.kind].takes.includes(wanted))
+    .map((alert) => [alert.id, of.get(alert.camera_id)]);
 }

@@ -81,10 +81,10 @@ document.addEventListener("acted", () => refresh().catch(() => {}));
 
 const ACTS = {
   ...ALERT_ACTS,
-  accept: () => put("Noted: it is learned anew.", "POST", `${path}/pose/accept`),
-  "put-back": () => put("Noted: the next people will tell.", "POST", `${path}/pose/put-back`),
-  relearn: () => put("Noted: it is learned anew.", "POST", `${path}/reference/reset`),
-  undo: () => put("Taken back: all is as it was.", "POST", `${path}/pose/undo`),
+  accept: () => put("New aim kept.", "POST", `${path}/pose/accept`),
+  "put-back": () => put("Put back.", "POST", `${path}/pose/put-back`),
+  relearn: () => put("Being learned anew.", "POST", `${path}/reference/reset`),
+  undo: () => put("Undone.", "POST", `${path}/pose/undo`),
 
   async agree() {
     const yes = await confirmed({
@@ -123,7 +123,7 @@ const ACTS = {
     if (yes) await done("The training is cancelled.", call("DELETE", `/trainings/${training}`));
   },
 
-  maintain: () => planMaintenance((body) => signed("POST", `${path}/maintenance`, body)),
+  maintain: () => planMaintenance((body) => put("Maintenance planned.", "POST", `${path}/maintenance`, body)),
 
   async "end-window"({ window: id, state }) {
     const yes = await confirmed({

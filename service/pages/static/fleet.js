@@ -2,8 +2,9 @@
 // which are fetched; rows that something happened to are fetched anew.
 
 import { announce, call, guarded } from "./act.js";
-import { ALERT_ACTS, listen } from "./alert_acts.js";
-import { withMany } from "./bulk_acts.js";
+import { ALERT_ACTS, done, listen } from "./alert_acts.js";
+import { answer, offer, withMany } from "./bulk_acts.js";
+import { signed } from "./dialogs.js";
 import { gathered, subscribe } from "./events.js";
 import { showPlaces, within } from "./places.js";
 import { keepTimes } from "./times.js";
@@ -35,12 +36,12 @@ let page = 0;
 let wanted = []; // the ids of this page
 
 /** Take a line of the index; a row says its place itself, the index by its number. */
-function note([id, name, state, rank, waiting, since, last, words, at], told = []) {
+function note([id, name, state, rank, waiting, since, last, words, kinds, at], told = []) {
   const place = told[at] ?? at;
   const text = `${name} ${id} ${WORDS[state]} ${words} ${place}`.toLowerCase();
   const site = place.split("#")[0].trim();
   const tags = (place.match(/#\S+/g) ?? []).map((tag) => tag.slice(1));
-  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text, site, tags });
+  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text, kinds, site, tags });
 }
 
 const noteAll = (told) => told.cameras.forEach((line) => note(line, told.places));
@@ -78,7 +79,7 @@ async function show() {
   const now = mine.map((id) => rows.get(id)).filter(Boolean);
   if (now.length !== list.children.length || now.some((row, at) => row !== list.children[at])) list.replaceChildren(...now);
   if (held && !list.contains(document.activeElement)) {
-    (document.querySelector(`#row-${CSS.escape(held.dataset.id)} ${what}`) ?? document.getElementById("main")).focus({ preventScroll: true });
+    (document.querySelector(`#row-${CSS.escape(held.dataset.id)} ${what}`) ?? list).focus({ preventScroll: true });
   }
 }
 
@@ -105,8 +106,7 @@ function say(cameras) {
   document.getElementById("forth").disabled = last === cameras.length;
   if (!bulk) return;
   for (const id of chosen) if (!index.has(id)) chosen.delete(id);
-  bulk.hidden = !chosen.size;
-  document.getElementById("chosen").textContent = chosen.size === 1 ? "1 camera" : `${chosen.size} cameras`;
+  offer(bulk, chosenOnes(), "camera");
   all.checked = cameras.length > 0 && cameras.every(({ id }) => chosen.has(id));
 }
 
@@ -204,9 +204,16 @@ function wordsOf(alert) {
 const soon = gathered(look, 100);
 const later = gathered(look, 1000);
 subscribe((event) => (event.type === "alert" ? soon(event) : later(event)));
-setInterval(() => document.hidden || fetchAll().catch(console.warn), ALL_AGAIN_MS);
+setInterval(() => document.hidden || Promise.all([fetchAll(), fetchBanners()]).catch(console.warn), ALL_AGAIN_MS);
 keepTimes(list, document.getElementById("banners"));
-listen(document.getElementById("banners"), ALERT_ACTS);
+listen(document.getElementById("banners"), {
+  ...ALERT_ACTS,
+  answer: (said, button) => answer({ ...said, name: button.closest(".banner").dataset.name }),
+  async "take-over"({ handover }) {
+    await done("Taken over.", signed("POST", `/handovers/${handover}/take`));
+    await fetchBanners();
+  },
+});
 
 search.addEventListener("input", ask);
 search.form.addEventListener("submit", (event) => event.preventDefault());
@@ -255,12 +262,19 @@ function choose(ids, on) {
   say(matching());
 }
 
+const chosenOnes = () =>
+  [...chosen].map((camera) => ({
+    camera,
+    kinds: index.get(camera).kinds,
+    name: rows.get(camera)?.querySelector(".who a").textContent,
+  }));
+
 list.addEventListener("change", ({ target }) => target.matches(".pick") && choose([target.closest("li").dataset.id], target.checked));
 all?.addEventListener("change", () => choose(matching().map(({ id }) => id), all.checked));
 document.getElementById("none-chosen")?.addEventListener("click", () => choose([...chosen], false));
 bulk?.addEventListener("click", (event) => {
   const button = event.target.closest("button[data-bulk]");
-  if (button) guarded(button, () => withMany(button.dataset.bulk, [...chosen], () => choose([...chosen], false)));
+  if (button) guarded(button, () => withMany(button.dataset, chosenOnes(), () => choose([...chosen], false)));
 });
 
 noteAll(JSON.parse(document.getElementById("index").textContent));

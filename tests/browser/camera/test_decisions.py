@@ -73,7 +73,7 @@ def test_one_question_is_answered_by_one_click_and_taken_back_by_another(seen, k
     expect = pytest.importorskip("playwright.sync_api").expect
     seen.set_viewport_size({"width": 390, "height": 844})
     seen.evaluate("document.getElementById('health').remove()")  # that no worker runs here
-    for label in ("It was put back", "Keep the new aim", "It did not move"):
+    for label in ("It was put back", "Keep the new aim", "False alarm"):
         box = seen.get_by_role("button", name=label).bounding_box()
         assert box["y"] + box["height"] <= 844, label
     shoot(seen, "decision-phone")
@@ -84,7 +84,7 @@ def test_one_question_is_answered_by_one_click_and_taken_back_by_another(seen, k
     named(seen, "Ada")
     expect(seen.locator(".headline")).to_have_text("Learning: 0 of 200 people.")
     expect(seen.locator(".undo")).to_contain_text("You kept the new aim just now.")
-    expect(seen.locator(".log")).to_contain_text("as the prior pose. new mast")
+    expect(seen.locator(".log")).to_contain_text("Ada kept the new aim. new mast")
     alert = only_alert(knocked)
     assert (alert["outcome"], alert["resolved_by"]) == ("accepted", "Ada")
     prior = knocked.http.get("/cameras/corner").json()["prior_pose"]
@@ -108,15 +108,15 @@ def test_the_camera_was_put_back(seen, knocked):
 def test_the_camera_is_learned_anew(seen, knocked):
     expect = pytest.importorskip("playwright.sync_api").expect
     seen.locator("#more > summary").click()
-    seen.get_by_role("button", name="Learn it anew").click()
+    seen.get_by_role("button", name="Learn anew at the old aim").click()
     named(seen, "Ada")
     expect(seen.locator(".headline")).to_have_text("Learning: 0 of 200 people.")
-    expect(seen.locator(".log")).to_contain_text("Ada had the camera learned anew")
+    expect(seen.locator(".log")).to_contain_text("Ada had it learned anew")
 
 
 def test_an_alert_is_a_false_alarm_by_keyboard_alone(seen, knocked):
     expect = pytest.importorskip("playwright.sync_api").expect
-    seen.get_by_role("button", name="It did not move").focus()
+    seen.get_by_role("button", name="False alarm").focus()
     seen.keyboard.press("Enter")
     expect(seen.get_by_label("Kept beside what you do here")).to_be_focused()
     seen.keyboard.type("Ada")

@@ -17,6 +17,7 @@ from service.app import create_app
 from service.cameras.maintenance import note_ends
 from service.enums import Activity, TrainingState
 from service.reasons import as_said
+from service.reports import escalated
 from service.store import cameras
 from service.store.cameras import ProposedPoseRecord
 from service.store.engines.store import Store
@@ -34,6 +35,7 @@ BY_ITSELF = {
     Activity.ALERT_OPENED,
     Activity.ALERT_GREW,
     Activity.ALERT_ESCALATED,
+    Activity.ALERT_MAILED,
     Activity.MAINTENANCE_OVER,
     Activity.TRAINING_SUCCEEDED,
     Activity.TRAINING_FAILED,
@@ -52,6 +54,7 @@ def ada(settings):
             "snapshots": "pictures",
             "window_tracks": 20,
             "escalate_after_min": 30.0,
+            "smtp_host": "mail.example",
             "webhook_allow": "203.0.113.0/24",
         }
     )
@@ -84,6 +87,8 @@ def look_after_alerts(http, bench):
         session.execute(text("UPDATE alerts SET opened_at = '2026-01-01 00:00:00.000000'"))
     with bench.store.write() as session:
         escalate(session, http.settings)
+        mail = escalated.next_mail(session, http.settings)
+        escalated.note_mailed(session, mail, None)
     ask(http, "POST", f"{url}/acknowledge")
     ask(http, "POST", f"{url}/silence", json={"until": hours(1)})
     ask(http, "POST", f"{url}/silence", json={"until": None})
@@ -163,6 +168,8 @@ def look_after_others(http):
     ask(http, "DELETE", f"/webhooks/{hook}")
     made = ask(http, "POST", "/tokens", json={"name": "=SUM(1)", "scopes": ["read"]})
     ask(http, "DELETE", f"/tokens/{made['id']}")
+    given = ask(http, "POST", "/handovers", json={"since": hours(-8), "note": "all calm"})
+    ask(http, "POST", f"/handovers/{given['id']}/take")
     http.post("/ui/login", data={"token": http.secret}, follow_redirects=False)
     bearer = http.headers.pop("Authorization")
     http.post("/ui/logout", follow_redirects=False)

@@ -50,7 +50,7 @@ def test_it_is_told_once_and_said_on_the_pages(duty, inbox):
     assert "escalated: nobody took it up in 31 minutes" in duty.http.get("/ui/alerts").text
     duty.http.post(f"/alerts/{alert_id}/acknowledge", json={"by": "Ada"}).raise_for_status()
     page = duty.http.get("/ui/alerts").text
-    assert "seen by Ada" in page
+    assert "acknowledged by Ada" in page
     assert "nobody took it up" not in page
 
 
@@ -77,8 +77,9 @@ def test_a_group_speaks_for_its_members(duty):
             session.add(
                 AlertRecord(
                     id="gm"[n] * 32, camera_id="corner" if group else None, group_id=group,
-                    track_source="bytetrack", kind="clock", state="firing", source="group",
-                    severity="critical", reasons=(), drift={}, camera_ids=None if group else [],
+                    track_source="bytetrack", kind="clock" if group else "many_moved",
+                    state="firing", source="group", severity="critical", reasons=(),
+                    drift={}, camera_ids=None if group else [],
                     opened_at=fleet.now - timedelta(hours=1), updated_at=fleet.now,
                 )
             )  # fmt: skip

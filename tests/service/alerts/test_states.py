@@ -171,7 +171,7 @@ def test_put_back_is_one_thing_however_it_is_said(bench, put_back):
     assert (body["state"], body["estimated"]) == ("learning", [])
     assert "0 tracks since the camera was put back" in body["reason"]
     assert states(bench.http) == {"learning"}
-    assert "Ada said that the camera is back at its prior pose." in told_history(bench.http)
+    assert "Ada said that it was put back." in told_history(bench.http)
     bench.see(PRIOR)
     assert states(bench.http) == {"ok"}
 
@@ -292,7 +292,7 @@ def test_a_mended_clock_is_judged_by_who_comes_then(clocked):
     assert (alert["outcome"], alert["resolved_by"]) == ("mended", "Ada")
     assert states(clocked.http) == {"learning"}
     assert "since the clock was mended" in clocked.pose()["reason"]
-    assert "Ada said that the clock is mended. NTP was off" in told_history(clocked.http)
+    assert "Ada said that it was put right. NTP was off" in told_history(clocked.http)
     clocked.see(PRIOR)
     assert states(clocked.http) == {"ok"}
 
@@ -320,5 +320,5 @@ def test_the_note_of_an_accepted_pose_is_kept(bench):
     knock(bench)
     body = {"by": "Ada", "note": "new mast"}
     bench.http.post("/cameras/corner/pose/accept", json=body).raise_for_status()
-    assert "Ada accepted the new pose as the prior pose. new mast" in told_history(bench.http)
+    assert "Ada kept the new aim. new mast" in told_history(bench.http)
     assert bench.alerts()[0]["note"] == "new mast"

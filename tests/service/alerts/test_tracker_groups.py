@@ -1,5 +1,6 @@
 """Many cameras of one tracker that move together are one alert."""
 
+import re
 import threading
 from datetime import UTC, datetime, timedelta
 
@@ -80,7 +81,7 @@ def test_the_third_of_five_makes_a_group_that_blames_the_tracker(town):
     town.moves(2, ago_min=30)
     group = town.group()
     assert (group["kind"], group["severity"], group["track_source"]) == (
-        "clock",
+        "many_moved",
         "critical",
         "bytetrack",
     )
@@ -262,7 +263,7 @@ def test_one_is_open_for_a_source_whatever_happens(town):
     for n in range(3):
         town.moves(n)
     with town.store.write() as session:
-        group = alerts.firing_group(session, "bytetrack", "clock")
+        group = alerts.firing_group(session, "bytetrack", "many_moved")
         values = {c.key: getattr(group, c.key) for c in AlertRecord.__mapper__.column_attrs}
         session.add(AlertRecord(**values | {"id": "b" * 32}))
         with pytest.raises(
@@ -290,6 +291,55 @@ def test_cameras_that_fall_silent_together_are_one_alert_of_their_own_kind(town)
     for n in range(3):
         town.moves(n, kind="no_data")
     group = town.group()
-    assert (group["kind"], group["camera_ids"]) == ("no_data", ["c0", "c1", "c2"])
+    assert (group["kind"], group["camera_ids"]) == ("many_silent", ["c0", "c1", "c2"])
     assert "fell silent together" in group["reason"]
     assert town.alerts(camera_id="c3")[0]["group_id"] is None
+
+
+def test_its_pages_have_words_of_its_own_and_its_members_lead_to_it(town):
+    """It was filed and answered as a clock, and each member had buttons of its own."""
+    town.build(3)
+    for n in range(3):
+        town.moves(n)
+    group = town.group()
+    parts = town.http.get("/ui/alerts").text.split('<li class="alert-row"')[1:]
+    rows = [part.split("</li>")[0] for part in parts]
+    (own,) = [row for row in rows if f'data-id="{group["id"]}"' in row]
+    assert re.findall(r'data-outcome="(\w+)"', own) == ["mended", "false_alarm"]
+    assert "Many moved" in own
+    assert "Clock" not in own
+    assert "The tracker, its clock or frame rate is as it should be." in own
+    filed = town.http.get("/ui/alerts?kind=clock").text
+    assert group["id"] not in filed
+    assert group["id"] in town.http.get("/ui/alerts?kind=many_moved").text
+    there = f'href="/ui/alerts?kind=many_moved&amp;kind=many_silent#alert-{group["id"]}"'
+    members = [row for row in rows if row is not own]
+    assert len(members) == 3
+    for row in members:
+        assert there in row.replace("&kind", "&amp;kind")
+        assert "<button" not in row
+        assert 'class="pick"' not in row
+    page = town.http.get("/ui/cameras/c0").text
+    assert there in page.replace("&kind", "&amp;kind")
+    assert "It is answered with 3 cameras of bytetrack" in page
+    assert "<summary>This camera apart</summary>" in page
+    (line,) = [e for e in town.http.get("/ui/fleet/index").json()["cameras"] if e[0] == "c0"]
+    assert line[8] == "member"
+
+
+def test_who_hears_of_moves_alone_hears_of_a_group_that_speaks_for_them(town):
+    town.build(3)
+    for kind, count in (("drift", 3), ("no_data", 0)):
+        body = {"url": f"http://93.184.215.14/{kind}", "kinds": [kind]}
+        hook = town.http.post("/webhooks", json=body).json()["id"]
+        with town.store.read() as session:
+            before = len(webhooks.audible(session, [kind], datetime.now(UTC)))
+        assert before == 0
+        if count:
+            for n in range(count):
+                town.moves(n)
+        log = town.http.get(f"/webhooks/{hook}/deliveries").json()["items"]
+        assert len(log) == count  # two of cameras, and the group
+        with town.store.read() as session:
+            told = webhooks.audible(session, [kind], datetime.now(UTC))
+        assert [each.kind for each in told] == (["many_moved"] if count else [])

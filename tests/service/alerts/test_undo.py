@@ -58,7 +58,7 @@ def test_all_is_as_it_was(bench, answer, people):
     assert picture(bench) == before
     assert states(bench.http) == {"drifting"}
     log = told_history(bench.http)
-    assert "Ada took the last answer back." in log
+    assert "Ada undid the last answer." in log
     assert "opened the alert “the camera moved” again" in log
     problem(bench.http.post(URL), 409, "conflict")  # once
     # And it goes on from there: people tell that it was put right after all.

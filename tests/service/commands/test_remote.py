@@ -70,7 +70,7 @@ def test_the_status_is_for_people_for_programs_and_for_scripts(running, tmp_path
     assert alerts == running.http.get("/alerts").json()["items"]
     (heading, row) = ask(tmp_path, running, "alerts", "--camera", "gate", code=1)
     assert row.startswith(seen)
-    assert "seen by Ines" in row
+    assert "acknowledged by Ines" in row
     assert row.index("critical") == heading.index("severity")
     running.http.post(f"/alerts/{seen}/resolve", json={"outcome": "put_back"})
     assert len(ask(tmp_path, running, "alerts", "--camera", "gate")) == 1

@@ -251,8 +251,13 @@ def test_a_group_is_told_as_one_alert_of_its_tracker(post_room):
     alert_id = post_room.open("clock")
     with post_room.store.read() as session:
         body = alert_body(alerts.show_alert(session, alert_id))
-    body |= {"camera_id": None, "camera_ids": ["a", "b", "c"], "track_source": "bytetrack"}
+    body |= {
+        "kind": "many_moved",
+        "camera_id": None,
+        "camera_ids": ["a", "b", "c"],
+        "track_source": "bytetrack",
+    }
     (alert,) = postable_alerts(body, None, changed=False)
     assert alert["labels"]["track_source"] == "bytetrack"
     assert "camera_id" not in alert["labels"]
-    assert alert["annotations"]["summary"] == "clock: 3 cameras of bytetrack"
+    assert alert["annotations"]["summary"] == "many moved: 3 cameras of bytetrack"

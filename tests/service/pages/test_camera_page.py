@@ -110,7 +110,7 @@ def test_flags_and_deeds_say_who_did_what(bench):
     assert 'data-act="unsilence"' in text
     http.post("/cameras/corner/pose/accept", json={"by": "Ada"}).raise_for_status()
     text = page(http)
-    assert "Ada accepted the new pose as the prior pose." in text
+    assert "Ada kept the new aim." in text
     assert "Past alerts (1)" in text
     assert 'data-act="acknowledge"' not in text
 
@@ -158,7 +158,7 @@ def test_charts_say_something_from_one_estimate_on(bench):
     bench.http.post("/cameras/corner/pose/put-back", json={"by": "Ada"}).raise_for_status()
     text = page(bench.http)
     assert text.count('<g class="act"') == 4
-    assert "Ada said that the camera is back at its prior pose." in text
+    assert "Ada said that it was put back." in text
     assert "Plotly" not in text
 
 

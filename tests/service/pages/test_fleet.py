@@ -64,7 +64,7 @@ def test_what_needs_a_person_comes_first(http, fleet):
     assert index == http.get("/ui/fleet/index").json()
     assert "turned 3.1° (tilt +3.0°, pan −0.8°), " in words(html, "knocked")
     assert "cm lower" in words(html, "knocked")
-    assert "seen by Ines" in words(html, "seen")
+    assert "acknowledged by Ines" in words(html, "seen")
     assert "learning what is usual: 120 of 200 people" in words(html, "learns")
     assert "no people seen for 26 h" in words(html, "silent")
     assert "standing still" in words(html, "steady")

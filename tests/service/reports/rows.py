@@ -43,7 +43,7 @@ def some_weeks(fleet: Fleet) -> None:
     put(fleet, "c", "clock", "c1", "20 08:00", resolved_by="Bo", resolved_at="24 08:00",
         outcome="mended")  # fmt: skip
     put(fleet, "d", "no_data", "c3", "10 08:00", resolved_at="12 08:00", outcome="cleared")
-    put(fleet, "e", "clock", None, "26 08:00", camera_ids=["c1", "c2", "c3"],
+    put(fleet, "e", "many_moved", None, "26 08:00", camera_ids=["c1", "c2", "c3"],
         track_source="bytetrack", resolved_at="26 09:00", outcome="cleared")  # fmt: skip
     put(fleet, "m", "clock", "c3", "26 08:00", group_id="e", resolved_at="26 09:00",
         outcome="cleared")  # fmt: skip

@@ -7,13 +7,17 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from pydantic import ValidationError
 
+from service.alerts.staleness import StaleWatch
 from service.job_queue import JobQueue
 from service.operations.troubles import find_troubles
 from service.reports.sending import due_at, mail_text, next_period
 from service.reports.weekly import make_report
 from service.settings import Settings
 from service.store import reports
+from service.store.alerts import AlertRecord
+from service.store.journal import activity_after
 from service.workers.context import JobContext
+from service.workers.upkeep.reconciliation import run_reconcile
 from service.workers.upkeep.reports import ReportRounds
 from tests.running import RunningService, free_port, wait_for
 from tests.service.fleet_bench import Fleet
@@ -142,13 +146,15 @@ def test_a_mail_says_what_the_report_says(settings):
         "Moved (1)",
         "- Corner 1: tilt +3.0°, since Tue 24 Mar, 10:40; put back by Ada after 3 hours",
         "",
-        "Clocks (2)",
-        "- 3 cameras of bytetrack: a wrong clock, since Thu 26 Mar, 09:00; ended by itself after "
-        "60 minutes",
+        "Clocks (1)",
         "- Corner 1: people seem to walk too fast or too slowly: its clock or frame rate looks "
         "wrong, since Fri 20 Mar, 09:00; put right by Bo after 4 days",
         "",
-        "Called false (1)",
+        "Other alerts (1)",
+        "- 3 cameras of bytetrack: a wrong clock, since Thu 26 Mar, 09:00; ended by itself after "
+        "60 minutes",
+        "",
+        "False alarms (1)",
         "- Corner 2: a wrong clock, since Wed 25 Mar, 09:00; false alarm by Bo after 30 minutes",
         "",
         "Silent now (1): The quay",
@@ -270,3 +276,33 @@ def test_settings_that_cannot_be_are_refused(given, words):
 def test_the_password_is_shown_nowhere():
     settings = Settings(smtp_host="mail.example", smtp_password="a pass word", **MAIL)
     assert "a pass word" not in repr(settings)
+
+
+def test_what_nobody_took_up_is_mailed_once_and_again_where_it_was_not_taken(office, post_office):
+    """Only webhooks heard of an escalation."""
+    context = context_of(office, report_day=None, escalate_after_min=30.0, **post_office.settings)
+    long_ago = datetime.now(UTC) - timedelta(minutes=31)
+    with office.store.write() as session:
+        found = {a.camera_id: a for a in session.query(AlertRecord)}
+        for record in found.values():
+            record.opened_at = record.changed_at = long_ago
+        seen = found["c2"]
+        seen.acknowledged_by, seen.acknowledged_at = "Ada", long_ago
+    ReportRounds().run(context)
+    assert post_office.mails == []  # it is not escalated yet
+    run_reconcile(context, StaleWatch())
+    post_office.answer = "451 try again later"
+    ReportRounds().run(context)
+    post_office.answer = "250 OK"
+    for _ in range(2):
+        ReportRounds().run(context)
+    (mail,) = post_office.mails
+    assert post_office.senders[0][1] == ["ada@example.org", "bo@example.org"]
+    assert mail["Subject"] == "surefoot: nobody took up 1 alert"
+    told, _, url = mail.get_content().strip().splitlines()
+    assert told.startswith("- Corner 1: tilt +3.0°, since ")
+    assert told.endswith("; nobody took it up in 31 minutes")
+    assert url == "https://watch.example/ui/alerts?acknowledged=false"
+    with office.store.read() as session:
+        log = [entry.what for entry in activity_after(session, "c1", 0, 100)]
+    assert log[-2:] == ["alert.escalated", "alert.mailed"]
