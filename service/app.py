@@ -43,6 +43,7 @@ from service.api.middleware.dependencies import AppState
 from service.api.middleware.event_feed import Feed
 from service.api.middleware.hosts import OriginMiddleware
 from service.api.middleware.instruments import InstrumentMiddleware, Instruments
+from service.api.middleware.language import LanguageMiddleware
 from service.api.middleware.problems import FORESEEN, ProblemMiddleware, answer_of
 from service.api.middleware.rate_limits import RateMiddleware
 from service.cameras.tracks import Quota
@@ -56,6 +57,7 @@ from service.pages import (
     fleet,
     handover,
     health,
+    language,
     reference,
     registration,
     report,
@@ -146,6 +148,7 @@ def create_app(settings: Settings) -> FastAPI:
         webhooks_page,
         tokens,
         access,
+        language,
     ):
         app.router.routes.extend(module.router.routes)
     documented.document_errors(app)
@@ -156,6 +159,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.add_middleware(GuardMiddleware, settings=settings)
     app.add_middleware(OriginMiddleware, settings=settings)
     app.add_middleware(ProblemMiddleware)
+    app.add_middleware(LanguageMiddleware)
     app.add_middleware(InstrumentMiddleware, instruments=instruments)
     app.state.instruments = instruments
     return app

@@ -8,6 +8,7 @@ from sqlalchemy.orm import Session
 from service.settings import Settings
 from service.store import cameras, reports, tracks, webhooks, workers
 from service.store.engines.dialects import now_in
+from service.wording.language import _
 
 LONGEST_LAG = timedelta(seconds=60)
 _NAMED = 3
@@ -35,15 +36,18 @@ def _of_workers(session: Session, settings: Settings) -> list[Trouble]:
     known = workers.every(session)
     heard = workers.last_heard(known)
     found = [
-        Trouble(words=f"The worker {each.name} {each.trouble}", since=each.heartbeat_at)
+        Trouble(
+            words=_("The worker {name} {trouble}", name=each.name, trouble=each.trouble),
+            since=each.heartbeat_at,
+        )
         for each in known
         if each.trouble is not None
     ]
     if heard is None:
-        return [Trouble(words="No worker runs: no camera is looked at", since=None), *found]
+        return [Trouble(words=_("No worker runs: no camera is looked at"), since=None), *found]
     # By the database's clock, as heartbeats are; one of the future is no sign of life either.
     if abs((now_in(session) - heard).total_seconds()) >= settings.worker_lost_s:
-        silent = Trouble(words="No worker is heard of: no camera is looked at", since=heard)
+        silent = Trouble(words=_("No worker is heard of: no camera is looked at"), since=heard)
         return [silent, *found]
     return found
 
@@ -51,16 +55,17 @@ def _of_workers(session: Session, settings: Settings) -> list[Trouble]:
 def _of_the_queue(session: Session) -> list[Trouble]:
     failing = cameras.failing(session)
     names = {camera.id for camera in failing}
-    came = [at for i, (_, at) in tracks.unseen_since(session).items() if i not in names]
+    came = [at for i, (_s, at) in tracks.unseen_since(session).items() if i not in names]
     oldest = min(came, default=None)
     found = []
     if oldest is not None and datetime.now(UTC) - oldest > LONGEST_LAG:
-        found.append(Trouble(words="Tracks wait to be looked at", since=oldest))
+        found.append(Trouble(words=_("Tracks wait to be looked at"), since=oldest))
     if failing:
         some = ", ".join(camera.id for camera in failing[:_NAMED])
-        rest = f" and {len(failing) - _NAMED} more" if len(failing) > _NAMED else ""
+        if len(failing) > _NAMED:
+            some += " " + _("and {n} more", n=len(failing) - _NAMED)
         since = failing[0].estimate_failing_since
-        found.append(Trouble(words=f"Looks at {some}{rest} fail", since=since))
+        found.append(Trouble(words=_("Looks at {cameras} fail", cameras=some), since=since))
     return found
 
 
@@ -68,8 +73,12 @@ def _of_webhooks(session: Session) -> list[Trouble]:
     # By their names alone: an address often holds a secret.
     return [
         Trouble(
-            words=f"The webhook “{record.name or record.id}” "
-            + ("takes nothing" if record.enabled else "is switched off, as it failed for long"),
+            words=_("The webhook “{name}” takes nothing", name=record.name or record.id)
+            if record.enabled
+            else _(
+                "The webhook “{name}” is switched off, as it failed for long",
+                name=record.name or record.id,
+            ),
             since=record.failing_since,
         )
         for record in webhooks.every(session)
@@ -81,5 +90,5 @@ def _of_reports(session: Session, settings: Settings) -> list[Trouble]:
     last = reports.newest(session, datetime.now(UTC)) if settings.smtp_host else None
     if last is None or last.error is None:
         return []
-    words = f"The mail server did not take the weekly report: {last.error}"
+    words = _("The mail server did not take the weekly report: {error}", error=last.error)
     return [Trouble(words=words, since=last.made_at)]

@@ -91,13 +91,13 @@ def show_login(request: Request, state: StateDep, next: str = "") -> Response:
     """The form that a token is pasted into."""
     if not auth_on(state.settings):
         return RedirectResponse("/", status_code=303)
-    return render(request, "login.html", next=_ours(next))
+    return render(request, "login.html", next=ours(next))
 
 
 @router.post("/ui/login")
 def log_in(request: Request, form: FormDep, state: StateDep, address: AddressDep) -> Response:
     """Begin a session, and go on to where the person wanted to."""
-    wanted = _ours(form.one("next"))
+    wanted = ours(form.one("next"))
     if not auth_on(state.settings):
         return RedirectResponse("/", status_code=303)
     try:
@@ -115,7 +115,7 @@ def log_in(request: Request, form: FormDep, state: StateDep, address: AddressDep
         max_age=int(state.settings.session_hours * HOUR_S),
         httponly=True,
         samesite="lax",
-        secure=_over_https(request, state.settings),
+        secure=over_https(request, state.settings),
     )
     return answer
 
@@ -144,7 +144,7 @@ def _refused(request: Request, wanted: str, error: UnauthorizedError | Forbidden
     return page
 
 
-def _over_https(request: Request, settings: Settings) -> bool:
+def over_https(request: Request, settings: Settings) -> bool:
     """True if the person's browser speaks https, whatever is between."""
     if request.headers.get("origin", "").startswith("https://") or request.url.scheme == "https":
         return True
@@ -152,7 +152,7 @@ def _over_https(request: Request, settings: Settings) -> bool:
     return forwarded == "https" and is_proxy(request, settings)
 
 
-def _ours(wanted: str) -> str:
+def ours(wanted: str) -> str:
     """A path of this service; empty where somebody made up a link to elsewhere."""
     plain = wanted.isascii() and wanted.isprintable() and "\\" not in wanted
     return wanted if plain and wanted.startswith("/") and not wanted.startswith("//") else ""

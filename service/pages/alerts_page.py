@@ -22,6 +22,7 @@ from service.store.alerts import AlertRecord
 from service.wording import alerts as alert_words
 from service.wording.acts import ACTS
 from service.wording.camera import fleet_alert_flags
+from service.wording.language import N_, _
 from service.wording.times import Clock
 
 _A_PAGE = 100
@@ -102,12 +103,16 @@ class Chip:
 def _chips(asked: Sequence[tuple[str, str]]) -> list[list[Chip]]:
     """The choices, in groups: those of kinds add up, of all others one holds."""
     one_of = [
-        (("Firing", ()), ("Ended", ("state", AlertState.RESOLVED)), ("All", ("all", "true"))),
         (
-            ("Not acknowledged", ("acknowledged", "false")),
-            ("Acknowledged", ("acknowledged", "true")),
+            (N_("Firing"), ()),
+            (N_("Ended"), ("state", AlertState.RESOLVED)),
+            (N_("All"), ("all", "true")),
         ),
-        tuple((each.capitalize(), ("severity", each)) for each in Severity),
+        (
+            (N_("Not acknowledged"), ("acknowledged", "false")),
+            (N_("Acknowledged"), ("acknowledged", "true")),
+        ),
+        tuple((alert_words.SEVERITIES[each], ("severity", each)) for each in Severity),
     ]
     groups = []
     for group in one_of:
@@ -117,14 +122,16 @@ def _chips(asked: Sequence[tuple[str, str]]) -> list[list[Chip]]:
         for label, pair in group:
             on = pair in asked if pair else not any(name in names for name, _ in asked)
             query = others if on or not pair else [*others, pair]
-            chips.append(Chip(words=label, query=urlencode(query), on=on))
+            chips.append(Chip(words=_(label), query=urlencode(query), on=on))
         groups.append(chips)
     kinds = []
     for kind in AlertKind:
         pair = "kind", kind.value
         on = pair in asked
         query = [each for each in asked if each != pair] if on else [*asked, pair]
-        kinds.append(Chip(words=alert_words.BADGES[kind], query=urlencode(query), on=on, kind=kind))
+        kinds.append(
+            Chip(words=_(alert_words.BADGES[kind]), query=urlencode(query), on=on, kind=kind)
+        )
     return [*groups, kinds]
 
 

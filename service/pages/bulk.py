@@ -6,6 +6,7 @@ from typing import Any
 from service.enums import Act, AlertKind
 from service.store.alerts import MEMBER, MEMBER_KINDS, AlertRecord, answers_of
 from service.wording.acts import ACTS, CHOSEN_AS
+from service.wording.language import _
 
 _OF_ALERTS = (Act.ACKNOWLEDGE, Act.SILENCE)
 
@@ -31,7 +32,8 @@ def bulk_rule() -> dict[str, Any]:
             takes[kind].append(Act.MAINTENANCE)
     return {
         "kinds": {
-            kind: {"takes": takes[kind], "words": words} for kind, words in CHOSEN_AS.items()
+            kind: {"takes": takes[kind], "words": [_(each) for each in words]}
+            for kind, words in CHOSEN_AS.items()
         },
-        "done": {act: words.done for act, words in ACTS.items()},
+        "done": {act: _(words.done) for act, words in ACTS.items()},
     }

@@ -20,11 +20,12 @@ from service.store.journal import ActivityRecord
 from service.store.references import MaintenanceRecord
 from service.wording import alerts as alert_words
 from service.wording.camera import STATES
+from service.wording.language import N_, _, number
 from service.wording.moves import NAMES
 from service.wording.times import Clock
 
 POINTS = 160
-RANGES = ((1, "24 hours"), (7, "7 days"), (30, "30 days"), (0, "All"))
+RANGES = ((1, N_("24 hours")), (7, N_("7 days")), (30, N_("30 days")), (0, N_("All")))
 _TABLE = 20
 _LEAST_DEG, _LEAST_M = 1.0, 0.2  # of a value axis: less is noise writ large
 
@@ -65,7 +66,7 @@ def draw_charts(history: History, clock: Clock) -> list[Chart]:
         Mark(
             at_s=(alert.changed_at or alert.opened_at).timestamp(),
             kind="alarm",
-            words=f"{alert_words.KINDS[alert.kind]}, {clock.when(alert.opened_at)}",
+            words=f"{_(alert_words.KINDS[alert.kind])}, {clock.when(alert.opened_at)}",
         )
         for alert in history.alerts
     ]
@@ -81,7 +82,7 @@ def draw_charts(history: History, clock: Clock) -> list[Chart]:
     first_s, last_s = history.items[0].to_s, history.items[-1].to_s
     times = TimeAxis.of(first_s, max([last_s, *(mark.at_s for mark in marks)]), clock.zone)
     spans = [
-        Span(from_s=w.from_at.timestamp(), to_s=w.until.timestamp(), words="maintained")
+        Span(from_s=w.from_at.timestamp(), to_s=w.until.timestamp(), words=_("maintained"))
         for w in history.windows
     ]
     charts = []
@@ -92,11 +93,11 @@ def draw_charts(history: History, clock: Clock) -> list[Chart]:
             (record.created_at.timestamp(), _shown(PoseParameters.of_pose(record.pose), name))
             for record in reversed(history.priors)
         ]
-        label = f"{words} over time; its newest values are in the table below"
+        label = _("{number} over time; its newest values are in the table below", number=_(words))
         charts.append(
             Chart(
-                name=words.capitalize(),
-                newest=value_words(history.items[-1], name) if told else "not told",
+                name=_(words).capitalize(),
+                newest=value_words(history.items[-1], name) if told else _("not told"),
                 drawing=chart_svg(
                     points,
                     prior,
@@ -118,7 +119,7 @@ def table_rows(items: Sequence[EstimateRecord], clock: Clock) -> list[list[str]]
             clock.when(clock.of(item.to_s)),
             *(value_words(item, name) for name in NAMES),
             str(item.tracks),
-            STATES[item.state],
+            _(STATES[item.state]),
         ]
         for item in reversed(items[-_TABLE:])
     ]
@@ -128,9 +129,10 @@ def value_words(item: EstimateRecord, name: str) -> str:
     """A number with half its 90 % interval: "26.99° ±0.36"."""
     point = _value(item, name)
     if point is None:
-        return "not told"
+        return _("not told")
     unit = " m" if name == "height" else "°"
-    return f"{point[0]:.2f}{unit} ±{point[1]:.2f}".replace("-", "\N{MINUS SIGN}")
+    value, half = (number(each, ".2f") for each in point)
+    return f"{value}{unit} ±{half}".replace("-", "\N{MINUS SIGN}")
 
 
 def _point(item: EstimateRecord, name: str, clock: Clock) -> Point:
@@ -139,7 +141,12 @@ def _point(item: EstimateRecord, name: str, clock: Clock) -> Point:
         at_s=item.to_s,
         value=None if found is None else found[0],
         half=None if found is None else found[1],
-        words=f"{clock.when(clock.of(item.to_s))}: {value_words(item, name)}, {item.tracks} people",
+        words=_(
+            "{time}: {value}, {n} people",
+            time=clock.when(clock.of(item.to_s)),
+            value=value_words(item, name),
+            n=item.tracks,
+        ),
     )
 
 

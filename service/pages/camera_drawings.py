@@ -16,13 +16,14 @@ from service.pages.drawings.ground_plan import ground_plan_svg
 from service.pages.drawings.picture import Overlay, ground_of, horizon_path, picture_svg
 from service.pages.drawings.zones import zone_parts
 from service.store.cameras import SnapshotRecord
+from service.wording.language import N_, _
 
 _POINTS = 24
 _OF = {
-    (): "no pose, which nobody knows",
-    ("prior",): "the prior",
-    ("served",): "the proposed pose",
-    ("prior", "served"): "the prior pose, dashed, and the served pose, solid",
+    (): N_("no pose, which nobody knows"),
+    ("prior",): N_("the prior pose"),
+    ("served",): N_("the proposed pose"),
+    ("prior", "served"): N_("the prior pose, dashed, and the served pose, solid"),
 }
 
 
@@ -60,10 +61,10 @@ def draw_camera(
     # Of the world as it is: the grid lies where the newest pose sees it, and the other one differs.
     ground = ground_of(lens, overlays[-1].pose) if overlays else None
     feet = [_fewer(track.uv) for track in tracks]
-    people = f"the feet of {len(feet)} people" if feet else "nobody yet"
+    people = _("the feet of {n} people", n=len(feet)) if feet else _("nobody yet")
     if before:
-        people += f" and of {len(before)} before it moved"
-    both = _OF[tuple(each.kind for each in overlays)]
+        people += _(" and of {n} before it moved", n=len(before))
+    both = _(_OF[tuple(each.kind for each in overlays)])
     snapshot = None
     if still is not None:
         snapshot = f"/cameras/{camera.record.id}/snapshot?v={still.sha256[:12]}"
@@ -73,7 +74,11 @@ def draw_camera(
             overlays,
             feet,
             [_fewer(track.uv) for track in before],
-            label=f"The picture with {people}; horizon and ground grid of {both}.",
+            label=_(
+                "The picture with {people}; horizon and ground grid of {poses}.",
+                people=people,
+                poses=both,
+            ),
             ground=ground,
             snapshot_url=snapshot,
             over=_zones(zones),
@@ -83,7 +88,11 @@ def draw_camera(
             overlays,
             feet,
             misplaced,
-            label=f"The ground from above with {people} and what the camera sees of it by {both}.",
+            label=_(
+                "The ground from above with {people} and what the camera sees of it by {poses}.",
+                people=people,
+                poses=both,
+            ),
         )
         if overlays
         else Markup(""),

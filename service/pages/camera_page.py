@@ -41,6 +41,7 @@ from service.wording import alerts as alert_words
 from service.wording import camera as camera_words
 from service.wording import moves
 from service.wording.camera import CameraFacts
+from service.wording.language import _
 from service.wording.reasons import in_words
 from service.wording.times import Clock
 from service.wording.zones import apply_words, corner_words, count_words, zone_words
@@ -261,6 +262,7 @@ def show(
         words=alert_words,
         in_words=in_words,
         states=camera_words.STATES,
+        training_words=camera_words.TRAININGS,
         charts=draw_charts(history, clock),
         chart_rows=table_rows(history.items, clock),
         days=days,
@@ -287,8 +289,8 @@ def _undo(page: CameraPage, caller: Caller | None) -> UndoWords | None:
     own = caller is not None and caller.name == entry.by
     return UndoWords(
         by=entry.by,
-        who="You" if own else entry.by or "Someone",
-        words=alert_words.DONE[entry.what],
+        who=_("You") if own else entry.by or _("Someone"),
+        words=_(alert_words.ANSWERED[entry.what]),
         at=entry.at,
         until=entry.at + UNDO_WITHIN,
     )

@@ -44,6 +44,7 @@ from service.wording.camera import (
     fleet_flags,
     fleet_line,
 )
+from service.wording.language import _
 from service.wording.reasons import group_in_words
 from service.wording.times import Clock
 
@@ -227,7 +228,7 @@ def show(
         request,
         "fleet.html",
         newest_event=newest,
-        counts=[(each, word, count[each]) for each, word in STATES.items()],
+        counts=[(each, _(word), count[each]) for each, word in STATES.items()],
         waiting=alerts.count_waiting(session, datetime.now(UTC)),
         index=index_document(index),
         rows=list_fleet(session, state.settings, [entry.id for entry in found[:PAGE]]),

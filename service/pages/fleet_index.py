@@ -14,6 +14,7 @@ from service.settings import Settings
 from service.store import fleet
 from service.store.fleet import Label
 from service.wording.camera import STATES, shown_as
+from service.wording.language import _
 from service.wording.times import from_seconds
 
 # How soon a camera without an alert needs a person.
@@ -67,7 +68,7 @@ class Entry:
     ) -> bool:
         """True of one of some states and of a site, if any are named, with all words and tags."""
         own = self.label
-        text = f"{own.name} {self.id} {STATES[self.shown]} {self.words} {own.place}".casefold()
+        text = f"{own.name} {self.id} {_(STATES[self.shown])} {self.words} {own.place}".casefold()
         return (
             (not states or self.shown in states)
             and (not site or own.site == site or own.site.startswith(f"{site}/"))

@@ -21,6 +21,7 @@ from service.formats.track import Clock, Limits
 from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
 from service.pages.registration_form import RegistrationForm
+from service.wording.language import N_, _
 from service.wording.typed_pose import (
     Saying,
     judge_pose,
@@ -35,6 +36,15 @@ _MOST_TRACKS, _MOST_POINTS = 80, 40  # of recorded ones, which every preview tak
 _USUAL_RATE_HZ = 25.0
 _AN_EPOCH_S = 1e9  # recordings to try have frames and no dates
 _A_RECORDING_S = 366 * DAY_S
+
+
+# What a calibration file may say, by a field of it.
+_READ = {
+    "fx": N_("lens"),
+    "width": N_("picture size"),
+    "rotation": N_("rotation"),
+    "translation_m": N_("translation"),
+}
 
 
 class PreviewBody(Body):
@@ -75,7 +85,7 @@ class FilledOut(BaseModel):
         if value.size is not None:
             fields |= {"width": str(value.size[0]), "height": str(value.size[1])}
         if value.matrix is not None:
-            fx, _, cx, _, fy, cy = value.matrix[:6]
+            fx, cx, fy, cy = (value.matrix[n] for n in (0, 2, 4, 5))
             fields |= {"lens_form": "pixels", "projection": value.projection}
             fields |= {"fx": _say(fx), "fy": _say(fy), "cx": _say(cx), "cy": _say(cy)}
         if value.distortion is not None:
@@ -87,14 +97,12 @@ class FilledOut(BaseModel):
             fields["translation_m"] = "  ".join(_say(number) for number in value.translation)
         if "rotation" in fields and "translation_m" in fields:
             fields["form"] = "matrix"
-        names = {"fx": "lens", "width": "picture size", "rotation": "rotation"}
-        names["translation_m"] = "translation"
-        read = ", ".join(word for name, word in names.items() if name in fields)
-        missing = ", ".join(word for name, word in names.items() if name not in fields)
-        return cls(
-            fields=fields,
-            text=f"Read: {read}." + (f" Not in the file: {missing}." if missing else ""),
-        )
+        read = ", ".join(_(word) for name, word in _READ.items() if name in fields)
+        missing = ", ".join(_(word) for name, word in _READ.items() if name not in fields)
+        text = _("Read: {names}.", names=read)
+        if missing:
+            text += " " + _("Not in the file: {names}.", names=missing)
+        return cls(fields=fields, text=text)
 
 
 @router.get("/ui/register")
@@ -127,12 +135,16 @@ def preview(body: PreviewBody) -> PreviewOut:
         rate_hz = None if read.rest is None else read.rest.frame_rate_hz
         says += judge_tracks(lens, pose, tracks, max(rate_hz or _USUAL_RATE_HZ, 1e-3))
     view = ground_of(lens, pose)
-    squares = "no ground in it" if view is None else f"a square is {view.spacing_m:g} m"
+    squares = _("no ground in it")
+    if view is not None:
+        squares = _("a square is {m:g} m", m=view.spacing_m)
     drawn = picture_svg(
         lens,
         [Overlay(pose=pose, kind="prior")],
         feet,
-        label=f"The picture with the horizon and a grid on the ground; {squares}",
+        label=_(
+            "The picture with the horizon and a grid on the ground; {squares}", squares=squares
+        ),
         ground=view,
     )
     return PreviewOut(
@@ -172,14 +184,16 @@ def tracks(
         frames = np.round((track.points[:, 0] - _AN_EPOCH_S) * frame_rate_hz)
         points = np.column_stack([frames, np.round(track.points[:, 1:], 1)])
         thinned.append(points[:: max(-(-len(points) // _MOST_POINTS), 1)].tolist())
-    text = f"{len(batch.tracks)} tracks read"
+    text = _("{n} tracks read", n=len(batch.tracks))
     if len(some) < len(batch.tracks):
-        text += f", {len(some)} of them shown"
+        text += _(", {n} of them shown", n=len(some))
     if batch.left_out:
-        text += f"; {batch.left_out} lines are of no person"
+        text += _("; {n} lines are of no person", n=batch.left_out)
     if batch.rejections:
         first = batch.rejections[0]
-        text += f"; {len(batch.rejections)} left out, the first since: {first.detail}"
+        text += _(
+            "; {n} left out, the first since: {why}", n=len(batch.rejections), why=first.detail
+        )
     return TriedOut(tracks=thinned, text=f"{text}.")
 
 

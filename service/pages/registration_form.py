@@ -28,27 +28,29 @@ from service.api.schemas import (
     Triple,
 )
 from service.errors import FieldError, MalformedError
+from service.wording.language import N_, _
 
 Made = TypeVar("Made", bound=BaseModel)
 Typed = Annotated[str, Field(max_length=2000)]
 _FOLLOWS = "default_factory_not_called"  # of another error, which is told
 _SEPARATORS = re.compile(r"[\s,;\[\]()]+")
+_AT_MOST = N_("at most {le:g} is taken, got {got}")
 # What pydantic finds wrong, in the words of who types; `got` is what was typed.
 _REASONS = {
-    "missing": "is needed",
-    "int_from_float": "a whole number is needed, got {got}",
-    "greater_than": "more than {gt:g} is needed, got {got}",
-    "greater_than_equal": "at least {ge:g} is needed, got {got}",
-    "less_than_equal": "at most {le:g} is taken, got {got}",
-    "string_too_long": "at most {max_length} letters are taken",
-    "string_pattern_mismatch": "small letters, digits and hyphens are needed",
+    "missing": N_("is needed"),
+    "int_from_float": N_("a whole number is needed, got {got}"),
+    "greater_than": N_("more than {gt:g} is needed, got {got}"),
+    "greater_than_equal": N_("at least {ge:g} is needed, got {got}"),
+    "less_than_equal": _AT_MOST,
+    "string_too_long": N_("at most {max_length} letters are taken"),
+    "string_pattern_mismatch": N_("small letters, digits and hyphens are needed"),
 }
 # The field of the form that what a body makes of R and t is typed into.
 _OF_MATRIX = {
     "rvec": "rotation",
     **dict.fromkeys(("tvec_m", "height_m", "x_m", "y_m"), "translation_m"),
 }
-_UNDER_GROUND = (
+_UNDER_GROUND = N_(
     "R and t put the camera under the ground (height {height} m): R has to turn world into camera "
     "axes, and t is not the position but −R times it"
 )
@@ -63,7 +65,9 @@ def _number(text: str) -> float:
     if math.isfinite(value):
         return value
     raise PydanticCustomError(
-        "no_number", "a number is needed, got {got}", {"got": repr(text.strip()[:30])}
+        "no_number",
+        "{said}",
+        {"said": _("a number is needed, got {got!r}", got=text.strip()[:30])},
     )
 
 
@@ -78,9 +82,9 @@ def _numbers(*counts: int) -> Callable[[str], list[float]]:
             values = [math.nan]
         if len(values) in counts and all(math.isfinite(value) for value in values):
             return values
-        wanted = " or ".join(str(count) for count in counts)
-        said = {"wanted": wanted, "got": len(parts)}
-        raise PydanticCustomError("no_numbers", "{wanted} numbers are needed, got {got}", said)
+        wanted = _(" or ").join(str(count) for count in counts)
+        said = _("{wanted} numbers are needed, got {got}", wanted=wanted, got=len(parts))
+        raise PydanticCustomError("no_numbers", "{said}", {"said": said})
 
     return read
 
@@ -291,11 +295,11 @@ def _field_error(item: ErrorDetails) -> FieldError:
     """The field that an error is of, and the reason without the words of a programmer."""
     said: dict[str, Any] = item.get("ctx", {})
     if item["type"] == "value_error":  # of all fields together: it begins with a field's name
-        name, _, reason = str(said["error"]).partition(": ")
+        name, reason = str(said["error"]).partition(": ")[::2]
         return FieldError(pointer=f"/{name}", reason=reason)
     known, reason = _REASONS.get(item["type"]), item["msg"]  # which may have braces, as typed
     if known is not None:
-        reason = known.format(**{"got": _brief(item["input"]), **said})
+        reason = _(known, **{"got": _brief(item["input"]), **said})
     return FieldError(pointer=f"/{item['loc'][0]}", reason=reason)
 
 
@@ -303,8 +307,9 @@ def _of_matrix(error: FieldError) -> FieldError:
     """The same of the field that R and t were typed into."""
     name = error.pointer[1:]
     reason = error.reason
-    if name == "height_m" and not reason.startswith("at most"):
-        reason = _UNDER_GROUND.format(height=reason.split()[-1])
+    too_high = _(_AT_MOST).partition("{")[0]
+    if name == "height_m" and not reason.startswith(too_high):
+        reason = _(_UNDER_GROUND, height=reason.split()[-1])
     return FieldError(pointer=f"/{_OF_MATRIX.get(name, name)}", reason=reason)
 
 

@@ -18,6 +18,7 @@ from service.pages.drawings.site_map import SiteCamera, site_map_svg
 from service.store import cameras, journal
 from service.store.cameras import CameraRecord, PriorPoseRecord
 from service.wording.camera import STATES, shown_as
+from service.wording.language import _
 
 _MOST = 300  # cameras of a map: more hide one another
 _SetUp = tuple[CameraRecord, PriorPoseRecord]
@@ -61,7 +62,7 @@ def _on_map(record: CameraRecord, prior: PriorPoseRecord, status: CameraStatus) 
         prior=prior.pose,
         now=_now(status, prior.pose),
         shown=shown,
-        state=STATES[shown],
+        state=_(STATES[shown]),
     )
 
 

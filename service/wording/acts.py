@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from service.enums import Act, AlertKind, Answer
 from service.store.alerts import MEMBER
+from service.wording.language import N_
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,36 +17,44 @@ class ActWords:
 
 
 ACTS: dict[Answer | Act, ActWords] = {
-    Answer.PUT_BACK: ActWords(one="It was put back", many="They were put back", done="Put back"),
-    Answer.ACCEPTED: ActWords(
-        one="Keep the new aim", many="Keep the new aims", done="New aim kept"
+    Answer.PUT_BACK: ActWords(
+        one=N_("It was put back"), many=N_("They were put back"), done=N_("Put back")
     ),
-    Answer.MENDED: ActWords(one="It was put right", many="They were put right", done="Put right"),
-    Answer.FALSE_ALARM: ActWords(one="False alarm", many="False alarms", done="False alarm"),
-    Act.ACKNOWLEDGE: ActWords(one="Acknowledge", many="Acknowledge", done="Acknowledged"),
-    Act.SILENCE: ActWords(one="Silence…", many="Silence…", done="Silenced"),
+    Answer.ACCEPTED: ActWords(
+        one=N_("Keep the new aim"), many=N_("Keep the new aims"), done=N_("New aim kept")
+    ),
+    Answer.MENDED: ActWords(
+        one=N_("It was put right"), many=N_("They were put right"), done=N_("Put right")
+    ),
+    Answer.FALSE_ALARM: ActWords(
+        one=N_("False alarm"), many=N_("False alarms"), done=N_("False alarm")
+    ),
+    Act.ACKNOWLEDGE: ActWords(
+        one=N_("Acknowledge"), many=N_("Acknowledge"), done=N_("Acknowledged")
+    ),
+    Act.SILENCE: ActWords(one=N_("Silence…"), many=N_("Silence…"), done=N_("Silenced")),
     Act.MAINTENANCE: ActWords(
-        one="Plan maintenance…", many="Plan maintenance…", done="Maintenance planned"
+        one=N_("Plan maintenance…"), many=N_("Plan maintenance…"), done=N_("Maintenance planned")
     ),
     Act.RESET: ActWords(
-        one="Learn anew at the old aim",
-        many="Learn anew at the old aims",
-        done="Being learned anew",
+        one=N_("Learn anew at the old aim"),
+        many=N_("Learn anew at the old aims"),
+        done=N_("Being learned anew"),
     ),
-    Act.TAG: ActWords(one="Tag…", many="Tag…", done="Tagged"),
-    Act.UNDO: ActWords(one="Undo", many="Undo", done="Undone"),
+    Act.TAG: ActWords(one=N_("Tag…"), many=N_("Tag…"), done=N_("Tagged")),
+    Act.UNDO: ActWords(one=N_("Undo"), many=N_("Undo"), done=N_("Undone")),
 }
 # After "1 of 5" and "2 of 5": what those are that do not take what the others take.
 CHOSEN_AS: dict[AlertKind | str, tuple[str, str]] = {
-    AlertKind.DRIFT: ("moved", "moved"),
-    AlertKind.CLOCK: ("is a clock fault", "are clock faults"),
-    AlertKind.UNSURE: ("is unsure", "are unsure"),
-    AlertKind.NO_DATA: ("is silent", "are silent"),
-    AlertKind.STALE: ("is not looked at", "are not looked at"),
-    AlertKind.TRACKER: ("has another tracker", "have another tracker"),
-    AlertKind.PICTURE: ("has a faulty picture", "have faulty pictures"),
-    AlertKind.MANY_MOVED: ("is a tracker's", "are trackers'"),
-    AlertKind.MANY_SILENT: ("is a tracker's", "are trackers'"),
-    MEMBER: ("is answered with its tracker", "are answered with their tracker"),
-    "": ("has no open alert", "have no open alert"),
+    AlertKind.DRIFT: (N_("moved"), N_("moved")),
+    AlertKind.CLOCK: (N_("is a clock fault"), N_("are clock faults")),
+    AlertKind.UNSURE: (N_("is unsure"), N_("are unsure")),
+    AlertKind.NO_DATA: (N_("is silent"), N_("are silent")),
+    AlertKind.STALE: (N_("is not looked at"), N_("are not looked at")),
+    AlertKind.TRACKER: (N_("has another tracker"), N_("have another tracker")),
+    AlertKind.PICTURE: (N_("has a faulty picture"), N_("have faulty pictures")),
+    AlertKind.MANY_MOVED: (N_("is a tracker's"), N_("are trackers'")),
+    AlertKind.MANY_SILENT: (N_("is a tracker's"), N_("are trackers'")),
+    MEMBER: (N_("is answered with its tracker"), N_("are answered with their tracker")),
+    "": (N_("has no open alert"), N_("have no open alert")),
 }

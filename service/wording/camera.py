@@ -6,26 +6,34 @@ from datetime import datetime
 
 from models.monitoring.verdict import Drift
 from models.reasons import Reason
-from service.enums import AlertKind, AlertState, PoseState
+from service.enums import AlertKind, AlertState, PoseState, TrainingState
 from service.reasons import ServiceCode
 from service.store.alerts import MOVED_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.wording.alerts import KINDS
+from service.wording.language import N_, _, _n, inner
 from service.wording.moves import drift_words, moved_words, sure_words
 from service.wording.reasons import in_words
 from service.wording.times import Clock, duration
 
 # What a camera is shown as: its state, but for a wrong clock, which moves no camera.
 STATES: dict[PoseState | AlertKind, str] = {
-    PoseState.DRIFTING: "Moved",
-    AlertKind.CLOCK: "Clock",
-    PoseState.UNSURE: "Unsure",
-    PoseState.SUSPECTED: "Maybe moved",
-    PoseState.NO_DATA: "No people",
-    PoseState.UNCONNECTED: "Unconnected",
-    PoseState.UNCALIBRATED: "Uncalibrated",
-    PoseState.LEARNING: "Learning",
-    PoseState.OK: "Steady",
+    PoseState.DRIFTING: N_("Moved"),
+    AlertKind.CLOCK: N_("Clock"),
+    PoseState.UNSURE: N_("Unsure"),
+    PoseState.SUSPECTED: N_("Maybe moved"),
+    PoseState.NO_DATA: N_("No people"),
+    PoseState.UNCONNECTED: N_("Unconnected"),
+    PoseState.UNCALIBRATED: N_("Uncalibrated"),
+    PoseState.LEARNING: N_("Learning"),
+    PoseState.OK: N_("Steady"),
+}
+TRAININGS = {
+    TrainingState.QUEUED: N_("Queued"),
+    TrainingState.RUNNING: N_("Running"),
+    TrainingState.SUCCEEDED: N_("Succeeded"),
+    TrainingState.FAILED: N_("Failed"),
+    TrainingState.CANCELLED: N_("Cancelled"),
 }
 _FEW_HOURS = 6  # of date and time: fewer are a morning's people; of words alone
 # The alerts that a state speaks for; every other one is named.
@@ -70,7 +78,7 @@ def headline(camera: CameraFacts, clock: Clock) -> str:
     if camera.silence is None or camera.silent_since_s is None:
         return _status_words(camera, clock)
     since = clock.when(clock.of(camera.silent_since_s))
-    quiet = f"No people since {since}: {in_words(camera.silence)}."
+    quiet = _("No people since {time}: {why}.", time=since, why=in_words(camera.silence))
     return f"{_status_words(camera, clock)} {quiet}"
 
 
@@ -80,83 +88,104 @@ def _status_words(camera: CameraFacts, clock: Clock) -> str:
     doubts = [alert for alert in camera.alerts if alert.kind in MOVED_KINDS]
     if state == PoseState.DRIFTING and not camera.judged:
         words = _moved(camera, estimate, clock) if estimate and known else _alarmed(doubts)
-        return f"{words} That is what is known last: the next people will tell how it stands now."
+        last = _("That is what is known last: the next people will tell how it stands now.")
+        return f"{words} {last}"
     if estimate is not None and camera.judged and estimate.drifted:
         return _moved(camera, estimate, clock)
     if doubts:  # of a reference, or about a move whose size is not identifiable
         return _alarmed(doubts)
     if state == PoseState.UNSURE:
-        return (
+        return _(
             "Something changed: people walk on none of the paths that were learned. The camera was "
             "turned far, or people walk elsewhere; a look at its picture tells which."
         )
     if state == PoseState.UNCONNECTED:
-        return "Nobody has posted anybody's track for this camera yet."
+        return _("Nobody has posted anybody's track for this camera yet.")
     if state == PoseState.UNCALIBRATED:
-        return (
+        return _(
             "Nobody has said how high it hangs and where it looks. The people before it tell: see "
             "below, and agree once it looks right."
         )
     if state == PoseState.LEARNING or estimate is None or not camera.judged:
         return _waiting(camera)
     if state == PoseState.NO_DATA:
-        return "When it was last told, it stood where it should."
+        return _("When it was last told, it stood where it should.")
     if state == PoseState.SUSPECTED:
         how = moved_words(estimate)
         share = f"{100 * estimate.moved:.0f} %"
-        return f"It may have moved ({share}){how and ': it ' + how}. The next people will tell."
-    people = (
-        f"{estimate.tracks} people of the last {duration(estimate.to_s - estimate.from_s)} show"
+        if not how:
+            return _("It may have moved ({share}). The next people will tell.", share=share)
+        return _(
+            "It may have moved ({share}): it {how}. The next people will tell.",
+            share=share,
+            how=how,
+        )
+    return _(
+        "Standing where it should, as {n} people of the last {time} show{sure}.",
+        n=estimate.tracks,
+        time=duration(estimate.to_s - estimate.from_s),
+        sure=sure_words(estimate),
     )
-    return f"Standing where it should, as {people}{sure_words(estimate)}."
 
 
 def _alarmed(doubts: Sequence[AlertRecord]) -> str:
-    return f"It may not stand where it should: {in_words(doubts[0].reasons)}."
+    return _("It may not stand where it should: {why}.", why=in_words(doubts[0].reasons))
 
 
 def _moved(camera: CameraFacts, estimate: EstimateRecord, clock: Clock) -> str:
-    since = ""
-    if estimate.drift_since is not None:
-        since = f" about {clock.when(estimate.drift_since)}"
+    since = "" if estimate.drift_since is None else clock.when(estimate.drift_since)
+    sure = sure_words(estimate)
     if any(alert.kind == AlertKind.CLOCK for alert in camera.alerts):
         how = moved_words(estimate)
-        return (
-            f"People seem to walk at another speed{since and ' since' + since}: a wrong clock or "
-            f"frame rate looks like that{how and ', or the camera ' + how}{sure_words(estimate)}."
-        )
+        if since:
+            said = _("People seem to walk at another speed since about {time}", time=since)
+        else:
+            said = _("People seem to walk at another speed")
+        if how:
+            why = _("a wrong clock or frame rate looks like that, or the camera {how}", how=how)
+        else:
+            why = _("a wrong clock or frame rate looks like that")
+        return f"{said}: {why}{sure}."
     words = moved_words(estimate, since)
-    if not words or not set(estimate.drifted) & set(estimate.identifiable):
-        return f"The camera moved{since}; the newest people cannot tell how far."
-    return f"The camera {words}{sure_words(estimate)}."
+    if words and set(estimate.drifted) & set(estimate.identifiable):
+        return _("The camera {moved}{sure}.", moved=words, sure=sure)
+    if since:
+        return _(
+            "The camera moved about {time}; the newest people cannot tell how far.", time=since
+        )
+    return _("The camera moved; the newest people cannot tell how far.")
 
 
 def _waiting(camera: CameraFacts) -> str:
     if camera.state in (PoseState.OK, PoseState.NO_DATA):
-        who = camera.answered_by or "somebody"
-        return f"Where it should be, as {who} said. The next people will tell."
+        who = camera.answered_by or _("somebody")
+        return _("Where it should be, as {name} said. The next people will tell.", name=who)
     if not camera.ready:
-        return f"Learning: {camera.learned} of {camera.wanted} people."
-    return "Waiting for people: too few have come to tell how it stands."
+        return _("Learning: {n} of {wanted} people.", n=camera.learned, wanted=camera.wanted)
+    return _("Waiting for people: too few have come to tell how it stands.")
 
 
 def people_words(people: int, hours: int) -> str:
     """So many people; of how many hours, where they tell little of other times of day."""
-    of_all = f"{people} {'person' if people == 1 else 'people'}"
     if not 0 < hours < _FEW_HOURS:
-        return of_all
-    return f"{of_all} of {'a single hour' if hours == 1 else f'{hours} different hours'}"
+        return _n("{n} person", "{n} people", people)
+    if hours == 1:
+        return _n("{n} person of a single hour", "{n} people of a single hour", people)
+    return _("{n} people of {hours} different hours", n=people, hours=hours)
 
 
 def few_hours_words(counted: int, wanted: int, hours: int) -> str:
     """What people of a few hours leave unknown; empty while most are still to come."""
     if not 0 < hours < _FEW_HOURS or 2 * counted < wanted:
         return ""
-    when = "a single hour" if hours == 1 else f"{hours} hours"
-    return (
-        f"The reference is of {when} only, as of one morning: people of another time of day may "
-        "walk elsewhere, and that may look as if something had changed. With more people "
-        "(reference_tracks) it is of a whole day."
+    return _n(
+        "The reference is of a single hour only, as of one morning: people of another time of day "
+        "may walk elsewhere, and that may look as if something had changed. With more people "
+        "(reference_tracks) it is of a whole day.",
+        "The reference is of {n} hours only, as of one morning: people of another time of day "
+        "may walk elsewhere, and that may look as if something had changed. With more people "
+        "(reference_tracks) it is of a whole day.",
+        hours,
     )
 
 
@@ -182,31 +211,32 @@ def fleet_line(
         silent_s: since the newest track ended.
     """
     if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds:
-        return "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
+        return _("people seem to walk too fast or too slowly: its clock or frame rate looks wrong")
     if kinds and kinds[0] == AlertKind.STALE:
-        return "its estimate fails or lacks tracks: the alert says why, and since when"
+        return _("its estimate fails or lacks tracks: the alert says why, and since when")
     if state == PoseState.UNCONNECTED:
-        return "nobody has posted tracks for it yet: its page says how"
+        return _("nobody has posted tracks for it yet: its page says how")
     if state == PoseState.UNCALIBRATED:
-        return "its pose is found by the people before it: its page has it, to be agreed to"
+        return _("its pose is found by the people before it: its page has it, to be agreed to")
     if state == PoseState.LEARNING and learned is not None:
-        return f"learning what is usual: {learned} of {wanted} people"
+        return _("learning what is usual: {n} of {wanted} people", n=learned, wanted=wanted)
     if state == PoseState.LEARNING:
-        return "waiting for people to tell how it stands now"
+        return _("waiting for people to tell how it stands now")
     if state == PoseState.UNSURE:
-        return "people walk on none of the learned paths: turned far, or they walk elsewhere"
+        return _("people walk on none of the learned paths: turned far, or they walk elsewhere")
     if state == PoseState.NO_DATA:
-        return f"no people seen for {duration(silent_s)}, longer than is usual here"
+        time = duration(silent_s)
+        return _("no people seen for {time}, longer than is usual here", time=time)
     if state == PoseState.OK:
         if judged:
-            return "standing still"
-        return "where it should be, as somebody said; the next people will tell"
+            return _("standing still")
+        return _("where it should be, as somebody said; the next people will tell")
     moved = drift_words(drift)
     if state == PoseState.SUSPECTED:
-        return f"may have moved{moved and ': ' + moved}"
+        return _("may have moved: {moved}", moved=moved) if moved else _("may have moved")
     if moved and not judged:
-        return f"{moved} when it was last told"
-    return moved or "moved, but by how much is not told yet"
+        return _("{moved} when it was last told", moved=moved)
+    return moved or _("moved, but by how much is not told yet")
 
 
 def page_flags(
@@ -214,12 +244,12 @@ def page_flags(
 ) -> Sequence[str]:
     """Flags of a camera's page, beside those of its alerts."""
     found = [
-        f"Without the {str(lack.values['part']).replace('_', ' ')}"
+        _("Without the {part}", part=str(lack.values["part"]).replace("_", " "))
         for lack in lacks
         if lack.code == ServiceCode.WITHOUT_PART
     ]
     if attended_until is not None:
-        found.append(f"Maintenance until {clock.when(attended_until)}")
+        found.append(_("Maintenance until {time}", time=clock.when(attended_until)))
     return found
 
 
@@ -227,12 +257,17 @@ def page_alert_flags(alert: AlertRecord, group: AlertRecord | None, clock: Clock
     """Flags of a camera's page, of an alert that fires."""
     found = []
     if alert.acknowledged_at is not None:
-        found.append(f"Acknowledged by {alert.acknowledged_by}")
+        found.append(_("Acknowledged by {name}", name=alert.acknowledged_by))
     if alert.silenced_until is not None and alert.is_silenced(clock.now):
-        found.append(f"Silenced until {clock.when(alert.silenced_until)}")
+        found.append(_("Silenced until {time}", time=clock.when(alert.silenced_until)))
     if group is not None:
-        cameras = len(group.camera_ids or [])
-        found.append(f"One of {cameras} cameras of {alert.track_source} at once")
+        found.append(
+            _(
+                "One of {n} cameras of {tracker} at once",
+                n=len(group.camera_ids or []),
+                tracker=alert.track_source,
+            )
+        )
     return found
 
 
@@ -242,14 +277,15 @@ def fleet_flags(
     """The flags of a camera's line in the fleet, of what needs a person most first."""
     flags = []
     if attended_until is not None:
-        flags.append(f"maintenance for {duration((attended_until - now).total_seconds())} more")
+        left = duration((attended_until - now).total_seconds())
+        flags.append(_("maintenance for {time} more", time=left))
     if alerts:
         flags += fleet_alert_flags(alerts[0], now)
     elif state == PoseState.DRIFTING and attended_until is None:
-        flags.append("no alert is open")
+        flags.append(_("no alert is open"))
     for alert in alerts:
         if alert.kind not in _SPOKEN_FOR.get(state, ()):
-            flags.append(f"alert: {KINDS[alert.kind].lower()}")
+            flags.append(_("alert: {kind}", kind=inner(_(KINDS[alert.kind]))))
     return tuple(flags)
 
 
@@ -257,12 +293,13 @@ def fleet_alert_flags(alert: AlertRecord, now: datetime) -> tuple[str, ...]:
     """The flags of an alert in the fleet."""
     flags = []
     if alert.acknowledged_by is not None:
-        flags.append(f"acknowledged by {alert.acknowledged_by}")
+        flags.append(_("acknowledged by {name}", name=alert.acknowledged_by))
     elif alert.escalated_at is not None and alert.state == AlertState.FIRING:
-        waits_s = (now - alert.opened_at).total_seconds()
-        flags.append(f"escalated: nobody took it up in {duration(waits_s)}")
+        waits = duration((now - alert.opened_at).total_seconds())
+        flags.append(_("escalated: nobody took it up in {time}", time=waits))
     if alert.silenced_until is not None and alert.is_silenced(now):
-        flags.append(f"silenced for {duration((alert.silenced_until - now).total_seconds())} more")
+        left = duration((alert.silenced_until - now).total_seconds())
+        flags.append(_("silenced for {time} more", time=left))
     if alert.group_id is not None:
-        flags.append("with its tracker")
+        flags.append(_("with its tracker"))
     return tuple(flags)

@@ -10,9 +10,10 @@ from models.geometry.pose import ANGLES, FIELDS, CameraPose, PoseParameters
 from models.monitoring.verdict import Drift
 from models.quantiles import Z90
 from service.store.estimates import EstimateRecord
+from service.wording.language import N_, _, number
 
 # Operators say pan. Height is told apart.
-NAMES = {"heading": "pan", "tilt": "tilt", "roll": "roll", "height": "height"}
+NAMES = {"heading": N_("pan"), "tilt": N_("tilt"), "roll": N_("roll"), "height": N_("height")}
 TOLD_BY = 250  # people
 _SAYS_DEG, _SAYS_M = 0.1, 0.05  # less is not worth a word
 
@@ -41,16 +42,16 @@ def parameter_rows(
         poses = PoseParameters.of_pose(prior), PoseParameters.of_pose(served)
         before, after = (_shown(pose.of(name), name) for pose in poses)
         unit, digits = (" m", 2) if name == "height" else ("°", 1)
-        row = {"name": words.capitalize(), "prior": _minus(f"{before:.{digits}f}") + unit}
+        row = {"name": _(words).capitalize(), "prior": _minus(before, f".{digits}f") + unit}
         if estimate is not None and name in estimate.identifiable:
             drift, sd = (_shown(value, name) for value in estimate.drift.of(name))
             row |= {
-                "served": _minus(f"{after:.{digits}f}") + unit,
+                "served": _minus(after, f".{digits}f") + unit,
                 "drift": f"{signed(drift, digits)}{unit}",
-                "sure": f"±{max(Z90 * sd, 10.0**-digits):.{digits}f}{unit}",
+                "sure": f"±{number(max(Z90 * sd, 10.0**-digits), f'.{digits}f')}{unit}",
             }
         if estimate is not None and (least := _least_told(estimate, name)) is not None:
-            row["told"] = f"{least:.{digits}f}{unit}"
+            row["told"] = number(least, f".{digits}f") + unit
         rows.append(ParameterRow(**row))
     return tuple(rows)
 
@@ -60,7 +61,7 @@ def deaf_words(estimate: EstimateRecord | None) -> str:
     notice = {} if estimate is None else estimate.would_notice
     if not notice or notice["heading_rad"] is not None:
         return ""
-    return (
+    return _(
         "A pan would not be told: where people walk does not tell the heading. It would with more "
         "people in the reference, or with people who go more than one way."
     )
@@ -70,21 +71,28 @@ def moved_words(estimate: EstimateRecord, since: str = "") -> str:
     """The move of a camera after its name: "turned 5.1° (tilt +5.1°) and is 0.24 m higher"."""
     turn, height = _turn_words(estimate), _height_words(estimate)
     if height and estimate.drifted == ["height"]:
-        return f"is {height} than it should be{since and ', since'}{since}"
-    parts = [f"{turn}{since}" if turn else "", f"is {height}" if height else ""]
-    return " and ".join(part for part in parts if part)
+        height = _("is {height} than it should be", height=height)
+        return f"{height}, {_('since about {time}', time=since)}" if since else height
+    if turn and since:
+        turn = _("{turn} about {time}", turn=turn, time=since)
+    parts = [turn, _("is {height}", height=height) if height else ""]
+    return _(" and ").join(part for part in parts if part)
 
 
 def proposed_rows(pose: CameraPose, sd: Mapping[str, float]) -> list[tuple[str, str, str]]:
     """Name, value and half the 90 % interval of each number of a proposed pose; pan by a map."""
-    angles = {"Tilt": "tilt_rad", "Roll": "roll_rad", "Pan": "heading_rad"}
+    angles = {_("Tilt"): "tilt_rad", _("Roll"): "roll_rad", _("Pan"): "heading_rad"}
     return [
-        ("Height", f"{pose.height_m:.1f} m", f"±{Z90 * sd['height_m']:.1f} m"),
+        (
+            _("Height"),
+            f"{number(pose.height_m, '.1f')} m",
+            f"±{number(Z90 * sd['height_m'], '.1f')} m",
+        ),
         *(
             (
                 name,
-                f"{math.degrees(getattr(pose, field)):.1f}°",
-                f"±{math.degrees(Z90 * sd[field]):.1f}°",
+                f"{number(math.degrees(getattr(pose, field)), '.1f')}°",
+                f"±{number(math.degrees(Z90 * sd[field]), '.1f')}°",
             )
             for name, field in angles.items()
             if field in sd
@@ -97,11 +105,11 @@ def sure_words(estimate: EstimateRecord) -> str:
     parts = []
     half = angle_half_width_deg(estimate)
     if half is not None:
-        parts.append(f"±{max(half, 0.1):.1f}°")
+        parts.append(f"±{number(max(half, 0.1), '.1f')}°")
     tells_height = half is None or abs(estimate.drift_by.height_m) >= _least_height_m(estimate)
     if "height" in estimate.identifiable and tells_height:
-        parts.append(f"±{max(Z90 * estimate.pose_sd.height_m, 0.01):.2f} m")
-    return f"; sure to {' and '.join(parts)}" if parts else ""
+        parts.append(f"±{number(max(Z90 * estimate.pose_sd.height_m, 0.01), '.2f')} m")
+    return "; " + _("sure to {numbers}", numbers=_(" and ").join(parts)) if parts else ""
 
 
 def angle_half_width_deg(estimate: EstimateRecord) -> float | None:
@@ -124,12 +132,12 @@ def drift_words(drift: Drift | None) -> str:
         return ""
     parts = []
     named = ", ".join(
-        f"{NAMES[name]} {_minus(f'{math.degrees(drift.by.of(name)):+.1f}')}°"
+        f"{_(NAMES[name])} {_minus(math.degrees(drift.by.of(name)), '+.1f')}°"
         for name in ANGLES
         if name in drift.identifiable and drift.by.of(name)
     )
     if named:
-        parts.append(f"turned {math.degrees(abs(drift.angle_rad)):.1f}° ({named})")
+        parts.append(_("turned {deg:.1f}°", deg=math.degrees(abs(drift.angle_rad))) + f" ({named})")
     if "height" in drift.identifiable and abs(drift.by.height_m) >= 0.005:
         parts.append(height_change(drift.by.height_m))
     return ", ".join(parts)
@@ -138,7 +146,7 @@ def drift_words(drift: Drift | None) -> str:
 def offset_words(drift: Mapping[str, Any]) -> str:
     """An alert's kept drift in a line: "tilt +1.9°, pan −0.8°, 12 cm lower"; may be empty."""
     parts = [
-        f"{NAMES[name]} {signed(math.degrees(drift[FIELDS[name]]), 1)}°"
+        f"{_(NAMES[name])} {signed(math.degrees(drift[FIELDS[name]]), 1)}°"
         for name in ("heading", "tilt", "roll")
         if drift.get(FIELDS[name])
     ]
@@ -150,10 +158,13 @@ def offset_words(drift: Mapping[str, Any]) -> str:
 
 def height_change(metres: float) -> str:
     """A change of height: "12 cm lower", "1.3 m higher"."""
-    way = "higher" if metres > 0 else "lower"
     if abs(metres) < 0.995:
-        return f"{abs(metres) * 100:.0f} cm {way}"
-    return f"{abs(metres):.1f} m {way}"
+        return _height_by(f"{abs(metres) * 100:.0f} cm", metres)
+    return _height_by(f"{number(abs(metres), '.1f')} m", metres)
+
+
+def _height_by(size: str, metres: float) -> str:
+    return _("{size} higher", size=size) if metres > 0 else _("{size} lower", size=size)
 
 
 def misplaced_words(each: Sequence[Misplacement]) -> str:
@@ -162,17 +173,21 @@ def misplaced_words(each: Sequence[Misplacement]) -> str:
         return ""
     if all(one.off_m is not None and one.off_m < _SAYS_M for one in each):
         far = each[-1].distance_m
-        return f"By the prior pose, people up to {far:.0f} m away are placed where they stand."
+        return _(
+            "By the prior pose, people up to {m:.0f} m away are placed where they stand.", m=far
+        )
     first, *others = each
-    parts = [f"A person at {first.distance_m:.0f} m is now placed {_off_words(first)}"]
-    parts += [f"one at {one.distance_m:.0f} m {_off_words(one)}" for one in others]
+    parts = [
+        _("A person at {m:.0f} m is now placed {off}", m=first.distance_m, off=_off_words(first)),
+        *(_("one at {m:.0f} m {off}", m=one.distance_m, off=_off_words(one)) for one in others),
+    ]
     return f"{', '.join(parts)}."
 
 
 def signed(value: float, digits: int) -> str:
     """A number with its sign, a real minus, and never a minus nought."""
-    text = f"{value:+.{digits}f}"
-    return _minus("0" + text[2:] if float(text) == 0 else text)
+    zero = float(f"{value:.{digits}f}") == 0
+    return _minus(0.0, f".{digits}f") if zero else _minus(value, f"+.{digits}f")
 
 
 def _turn_words(estimate: EstimateRecord) -> str:
@@ -184,12 +199,12 @@ def _turn_words(estimate: EstimateRecord) -> str:
     if not angles:
         return ""
     named = [
-        f"{NAMES[name]} {signed(math.degrees(estimate.drift_by.of(name)), 1)}°"
+        f"{_(NAMES[name])} {signed(math.degrees(estimate.drift_by.of(name)), 1)}°"
         for name in angles
         if abs(math.degrees(estimate.drift_by.of(name))) >= _least_angle_deg(estimate, name)
     ]
     detail = f" ({', '.join(named)})" if named else ""
-    return f"turned {math.degrees(estimate.drift_angle_rad):.1f}°{detail}"
+    return _("turned {deg:.1f}°", deg=math.degrees(estimate.drift_angle_rad)) + detail
 
 
 def _height_words(estimate: EstimateRecord) -> str:
@@ -197,7 +212,7 @@ def _height_words(estimate: EstimateRecord) -> str:
     by_m = estimate.drift_by.height_m
     if "height" not in estimate.identifiable or abs(by_m) < _least_height_m(estimate):
         return ""
-    return f"{abs(by_m):.2f} m {'higher' if by_m > 0 else 'lower'}"
+    return _height_by(f"{number(abs(by_m), '.2f')} m", by_m)
 
 
 def _least_told(estimate: EstimateRecord, name: str) -> float | None:
@@ -219,16 +234,17 @@ def _least_height_m(estimate: EstimateRecord) -> float:
 
 def _off_words(one: Misplacement) -> str:
     if one.off_m is None or one.farther_m is None:
-        return "above the horizon, which is nowhere"
-    way = ""
+        return _("above the horizon, which is nowhere")
     # Mostly along the line of sight; else to a side.
     if abs(one.farther_m) > 0.7 * one.off_m and one.off_m >= _SAYS_M:
-        way = " too far" if one.farther_m > 0 else " too near"
-    return f"{one.off_m:.1f} m{way or ' off'}"
+        if one.farther_m > 0:
+            return _("{m:.1f} m too far", m=one.off_m)
+        return _("{m:.1f} m too near", m=one.off_m)
+    return _("{m:.1f} m off", m=one.off_m)
 
 
-def _minus(text: str) -> str:
-    return text.replace("-", "\N{MINUS SIGN}")
+def _minus(value: float, spec: str) -> str:
+    return number(value, spec).replace("-", "\N{MINUS SIGN}")
 
 
 def _shown(value: float, name: str) -> float:

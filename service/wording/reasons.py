@@ -13,14 +13,21 @@ from models.reasons import Reason, TracksCode
 from service.degrees import in_degrees
 from service.enums import Cause
 from service.reasons import ServiceCode
+from service.wording.language import N_, _, _n, number
 
 _Values = Mapping[str, Any]
 _SINCE = {
-    Cause.REFERENCE: "since the reference",
-    Cause.MAINTENANCE: "since the maintenance",
-    Cause.PUT_BACK: "since the camera was put back",
-    Cause.MENDED: "since the clock was mended",
-    Cause.FALSE_ALARM: "since the alert was called a false alarm",
+    Cause.REFERENCE: N_("since the reference"),
+    Cause.MAINTENANCE: N_("since the maintenance"),
+    Cause.PUT_BACK: N_("since the camera was put back"),
+    Cause.MENDED: N_("since the clock was mended"),
+    Cause.FALSE_ALARM: N_("since the alert was called a false alarm"),
+}
+_NUMBERS = {
+    "tilt": N_("tilt"),
+    "roll": N_("roll"),
+    "height": N_("height"),
+    "heading": N_("heading"),
 }
 _GROUPS = (ServiceCode.MOVED_TOGETHER, ServiceCode.FELL_SILENT_TOGETHER)
 
@@ -31,10 +38,10 @@ def in_words(reasons: Sequence[Reason], zone: tzinfo = UTC) -> str:
     Times in them are said by a zone's clock.
     """
     said = ""
-    for number, reason in enumerate(reasons):
+    for n, reason in enumerate(reasons, 1):
         words, values = _WORDS[reason.code], {**_as_told(reason.values), "zone": zone}
-        said += words.format(**values) if isinstance(words, str) else words(values)
-        if number + 1 < len(reasons):
+        said += _(words, **values) if isinstance(words, str) else words(values)
+        if n < len(reasons):
             said += " " if reason.code is ServiceCode.LAST_IDENTIFIABLE else "; "
     return said
 
@@ -58,257 +65,315 @@ def _as_told(values: _Values) -> _Values:
 
 
 def _limit(v: _Values) -> str:
-    return f"{v['floor_deg']:g} deg or {v['floor_m']:g} m"
+    return _("{floor_deg:g} deg or {floor_m:g} m", **v)
 
 
 def _numbers(v: _Values) -> str:
     said = []
     for name in PARAMETERS:
         if name == "height" and "height_m" in v:
-            said.append(f"height {v['height_m']:+.2f} m (sd {v['height_sd_m']:.2f})")
+            said.append(_("height {height_m:+.2f} m (sd {height_sd_m:.2f})", **v))
         elif f"{name}_deg" in v:
-            said.append(f"{name} {v[f'{name}_deg']:+.2f} deg (sd {v[f'{name}_sd_deg']:.2f})")
-    return f"{', '.join(said)} against the prior pose; moved: {percent(v['moved'])}"
+            by, sd = v[f"{name}_deg"], v[f"{name}_sd_deg"]
+            words = _(_NUMBERS[name])
+            said.append(_("{number} {by:+.2f} deg (sd {sd:.2f})", number=words, by=by, sd=sd))
+    return _(
+        "{numbers} against the prior pose; moved: {share}",
+        numbers=", ".join(said),
+        share=percent(v["moved"]),
+    )
 
 
 def percent(share: float) -> str:
     """A probability in words, never quite sure: "97 %", "under 1 %", "over 99.9 %"."""
     if share < 0.01:
-        return "under 1 %"
+        return _("under {share} %", share=1)
     if share > 0.999:
-        return "over 99.9 %"
-    return f"{100 * share:.1f} %" if share > 0.99 else f"{100 * share:.0f} %"
+        return _("over {share} %", share=99.9)
+    return number(100 * share, ".1f" if share > 0.99 else ".0f") + " %"
 
 
 def _beyond_before(v: _Values) -> str:
-    return f"{_numbers(v)}: was beyond {_limit(v)}; it ends once a move is unlikely"
+    return _(
+        "{numbers}: was beyond {limit}; it ends once a move is unlikely",
+        numbers=_numbers(v),
+        limit=_limit(v),
+    )
+
+
+def _number(v: _Values) -> str:
+    name: str = v["number"]
+    return _(_NUMBERS[name])
 
 
 def _chart(v: _Values) -> str:
     if v["number"] == "times":
-        what = f"all times were too {'long' if v['sign'] > 0 else 'short'}"
+        up = v["sign"] > 0
+        what = _("all times were too long") if up else _("all times were too short")
+    elif v["sign"] > 0:
+        what = _("the {number} had gone up", number=_number(v))
     else:
-        what = f"the {v['number']} had gone {'up' if v['sign'] > 0 else 'down'}"
-    return (
-        f"the last {v['parties']} walking groups walk as they would if {what} "
-        f"(drift chart: {v['statistic']:.0f}, alarm at {v['level']:.0f})"
+        what = _("the {number} had gone down", number=_number(v))
+    return _(
+        "the last {parties} walking groups walk as they would if {what} (drift chart: "
+        "{statistic:.0f}, alarm at {level:.0f})",
+        what=what,
+        **v,
     )
 
 
 def _crept(v: _Values) -> str:
-    return (
-        f"has crept by {v['by_deg']:+.1f} deg (sd {v['sd_deg']:.1f}) in {v['number']} since "
-        f"{datetime.fromisoformat(v['since']):%Y-%m-%d}, by the first map and speeds of its "
-        f"reference (creep: {v['statistic']:.0f}, alarm at {v['level']:.0f})"
+    said = {"number": _number(v), "since": datetime.fromisoformat(v["since"])}
+    return _(
+        "has crept by {by_deg:+.1f} deg (sd {sd_deg:.1f}) in {number} since {since:%Y-%m-%d}, by "
+        "the first map and speeds of its reference (creep: {statistic:.0f}, alarm at {level:.0f})",
+        **{**v, **said},
     )
 
 
 def _scale_changed(v: _Values) -> str:
     factor, rate_hz = v["factor"], v["rate_hz"]
-    return (
-        f"the scale has changed by {100 * (factor - 1):+.0f} % and the angles have not: as if "
-        f"{rate_hz * factor:.3g} frames a second were taken for {rate_hz:.3g}, or the camera was "
-        f"{'raised' if factor > 1 else 'lowered'}"
+    said = {"percent": 100 * (factor - 1), "was_hz": rate_hz * factor, "rate_hz": rate_hz}
+    if factor > 1:
+        return _(
+            "the scale has changed by {percent:+.0f} % and the angles have not: as if {was_hz:.3g} "
+            "frames a second were taken for {rate_hz:.3g}, or the camera was raised",
+            **said,
+        )
+    return _(
+        "the scale has changed by {percent:+.0f} % and the angles have not: as if {was_hz:.3g} "
+        "frames a second were taken for {rate_hz:.3g}, or the camera was lowered",
+        **said,
     )
 
 
 def _ambiguous(v: _Values) -> str:
-    said = " and ".join(f"{turn:+.1f} deg" for turn in v["turns_deg"])
-    return f"turns of {said} explain where people walk about as well"
+    said = _(" and ").join(_("{turn:+.1f} deg", turn=turn) for turn in v["turns_deg"])
+    return _("turns of {turns} explain where people walk about as well", turns=said)
 
 
 def _unidentifiable(v: _Values) -> str:
     said = [
-        f"{name} (sd {v[f'{name}_sd_deg']:.1f} deg)"
+        _("{number} (sd {sd:.1f} deg)", number=_(_NUMBERS[name]), sd=v[f"{name}_sd_deg"])
         for name in ("tilt", "roll")
         if f"{name}_sd_deg" in v
     ]
     if "log_height_sd" in v:
-        said.append(f"height (sd {100 * v['log_height_sd']:.0f} %)")
-    text = "the tracks cannot tell " + " and ".join(said)
+        said.append(_("height (sd {percent:.0f} %)", percent=100 * v["log_height_sd"]))
+    text = _("the tracks cannot tell {numbers}", numbers=_(" and ").join(said))
     if "alike" in v:
-        first, second = v["alike"]
-        text += (
-            f": people walk too much alike, one way or along one path, and {first} makes up for "
-            f"{second}"
+        first, second = (_(_NUMBERS[name]) for name in v["alike"])
+        text += ": " + _(
+            "people walk too much alike, one way or along one path, and {first} makes up for "
+            "{second}",
+            first=first,
+            second=second,
         )
     return text
 
 
 def _few_groups(v: _Values) -> str:
-    return (
-        f"the {v['tracks']} tracks are of {v['parties']} "
-        f"{'walking group' if v['parties'] == 1 else 'walking groups'}, at least "
-        f"{v['least_parties']} are needed to tell the camera's drift from theirs"
+    return _n(
+        "the {tracks} tracks are of {n} walking group, at least {least_parties} are needed to tell "
+        "the camera's drift from theirs",
+        "the {tracks} tracks are of {n} walking groups, at least {least_parties} are needed to "
+        "tell the camera's drift from theirs",
+        v["parties"],
+        **v,
     )
 
 
 def _since(v: _Values) -> str:
-    return (
-        f"{v['tracks']} tracks {_SINCE[Cause(v['cause'])]}; at least {v['least_walkers']} of "
-        "people who walk for a few seconds inside the image are needed"
+    return _(
+        "{tracks} tracks {since}; at least {least_walkers} of people who walk for a few seconds "
+        "inside the image are needed",
+        since=_(_SINCE[Cause(v["cause"])]),
+        **v,
     )
 
 
 def _sure_of_pose(v: _Values) -> str:
     """How sure a proposed pose is: nine cases of ten are within that."""
-    return (
-        f"sure to {Z90 * v['tilt_sd_deg']:.1f}° in tilt, {Z90 * v['roll_sd_deg']:.1f}° in roll, "
-        f"{Z90 * v['height_sd_m']:.1f} m in height"
+    return _(
+        "sure to {tilt:.1f}° in tilt, {roll:.1f}° in roll, {height:.1f} m in height",
+        tilt=Z90 * v["tilt_sd_deg"],
+        roll=Z90 * v["roll_sd_deg"],
+        height=Z90 * v["height_sd_m"],
     )
 
 
 def _maintenance(v: _Values) -> str:
     at = datetime.fromisoformat(v["until"]).astimezone(v["zone"])
-    until = f"maintenance is under way until {at:%Y-%m-%d %H:%M}{'Z' if v['zone'] is UTC else ''}"
+    time = f"{at:%Y-%m-%d %H:%M}{'Z' if v['zone'] is UTC else ''}"
+    until = _("maintenance is under way until {time}", time=time)
     return f"{until} ({v['note']})" if v.get("note") else until
 
 
 def _silent(v: _Values) -> str:
-    words = f"no track for {v['silent_s_in_h']:.1f} h"
     if "missed_tracks" in v:
-        words += f", where about {v['missed_tracks']:.0f} are usual by now"
+        words = _(
+            "no track for {silent_s_in_h:.1f} h, where about {missed_tracks:.0f} are usual by now",
+            **v,
+        )
     else:
-        words += ", as is usual at this hour"
+        words = _("no track for {silent_s_in_h:.1f} h, as is usual at this hour", **v)
     late = v.get("late_s_in_h")
-    return words if late is None else f"{words}; its tracks come up to {late:.1f} h late"
+    if late is None:
+        return words
+    return f"{words}; {_('its tracks come up to {late:.1f} h late', late=late)}"
 
 
-def _of_tracker(v: _Values) -> str:
-    return f" of the tracker {v['track_source']!r}" if v["track_source"] else ""
+def _those_cameras(v: _Values) -> str:
+    if v["track_source"]:
+        return _("{cameras} cameras of the tracker {track_source!r}", **v)
+    return _("{cameras} cameras", **v)
 
 
 def _moved_together(v: _Values) -> str:
-    return (
-        f"{v['cameras']} cameras{_of_tracker(v)} moved together: the tracker or its clock is "
-        "the likely cause, rather than each camera by itself; cameras that hang on one mast or "
-        "building would look the same"
+    return _(
+        "{which} moved together: the tracker or its clock is the likely cause, rather than each "
+        "camera by itself; cameras that hang on one mast or building would look the same",
+        which=_those_cameras(v),
     )
 
 
 def _silent_together(v: _Values) -> str:
-    return (
-        f"{v['cameras']} cameras{_of_tracker(v)} fell silent together: the tracker, its "
-        "network or its clock is the likely cause, rather than each camera by itself"
+    return _(
+        "{which} fell silent together: the tracker, its network or its clock is the likely cause, "
+        "rather than each camera by itself",
+        which=_those_cameras(v),
     )
 
 
 def _other_sources(v: _Values) -> str:
-    names, counting = " and ".join(repr(name) for name in v["sources"]), v.get("counting")
-    return (
-        f"tracks of {names} come beside those of {counting!r}, which count: they are kept "
-        f"and move nothing. Should {counting!r} fall silent for {v['silent_s_in_h']:g} h, they "
-        f"take over once {v['wanted']} of them were seen while the camera was where it "
-        "should be; a person can say so at once"
+    return _(
+        "tracks of {names} come beside those of {counting!r}, which count: they are kept and move "
+        "nothing. Should {counting!r} fall silent for {silent_s_in_h:g} h, they take over once "
+        "{wanted} of them were seen while the camera was where it should be; a person can say so "
+        "at once",
+        names=_(" and ").join(repr(name) for name in v["sources"]),
+        **{"counting": None, **v},
     )
 
 
 # A text takes the values by their names.
 _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
-    TracksCode.BEYOND_LIMITS: lambda v: f"{_numbers(v)}, by more than {_limit(v)}",
-    TracksCode.SUSPECTED: lambda v: f"{_numbers(v)}, which is not sure enough for an alert",
+    TracksCode.BEYOND_LIMITS: lambda v: _(
+        "{numbers}, by more than {limit}", numbers=_numbers(v), limit=_limit(v)
+    ),
+    TracksCode.SUSPECTED: lambda v: _(
+        "{numbers}, which is not sure enough for an alert", numbers=_numbers(v)
+    ),
     TracksCode.BEYOND_LIMITS_BEFORE: _beyond_before,
-    TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE: lambda v: (
-        f"beyond {_limit(v)} when it was last told"
+    TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE: lambda v: _(
+        "beyond {limit} when it was last told", limit=_limit(v)
     ),
     TracksCode.WITHIN_LIMITS: _numbers,
     TracksCode.CHART: _chart,
     TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
-    TracksCode.PATHS_CHANGED: (
+    TracksCode.PATHS_CHANGED: N_(
         "people walk on none of the paths that were learned: the camera was turned far, or they "
         "walk elsewhere"
     ),
-    TracksCode.WAYS_CHANGED: (
+    TracksCode.WAYS_CHANGED: N_(
         "people walk the same ground other ways than they did: where they do tells no pose"
     ),
     TracksCode.HEADING_AMBIGUOUS: _ambiguous,
-    TracksCode.HEADING_UNIDENTIFIABLE: (
+    TracksCode.HEADING_UNIDENTIFIABLE: N_(
         "where people walk does not tell the heading (sd {heading_sd_deg:.1f} deg)"
     ),
     TracksCode.UNIDENTIFIABLE: _unidentifiable,
     TracksCode.TOO_FEW_GROUPS: _few_groups,
-    TracksCode.SPEED_UNUSUAL: (
+    TracksCode.SPEED_UNUSUAL: N_(
         "people walk at {speed_mps:.2f} m/s at the prior pose, {slow_mps:g} to {fast_mps:g} m/s "
         "is usual: the prior height or the frame rate is wrong"
     ),
-    TracksCode.STATURE_UNUSUAL: (
+    TracksCode.STATURE_UNUSUAL: N_(
         "boxes say that people are {stature_m:.2f} m tall at the prior pose, {short_m:g} to "
         "{tall_m:g} m is usual: the prior height is wrong"
     ),
-    TracksCode.PRIOR_POSE_DOUBTED: (
+    TracksCode.PRIOR_POSE_DOUBTED: N_(
         "the reference tracks put the camera {tilt_deg:+.1f} deg in tilt and {roll_deg:+.1f} deg "
         "in roll from its prior pose: the prior pose is wrong, or the camera had moved before"
     ),
-    TracksCode.PIECES: (
+    TracksCode.PIECES: N_(
         "{pieces:g} of {tracks:g} tracks are pieces of others' walks: the tracker loses people, "
         "each of whom counts once"
     ),
     ServiceCode.AS_SAID: "{text}",
-    ServiceCode.NOBODY_POSTED: "no track of anybody has been posted for it yet",
-    ServiceCode.POSE_UNKNOWN: lambda v: (
-        f"its pose is found by the people before it: {v['tracks']} tracks so far, of "
-        f"{v['least_walkers']} or more that walk"
+    ServiceCode.NOBODY_POSTED: N_("no track of anybody has been posted for it yet"),
+    ServiceCode.POSE_UNKNOWN: N_(
+        "its pose is found by the people before it: {tracks} tracks so far, of {least_walkers} or "
+        "more that walk"
     ),
-    ServiceCode.POSE_UNTOLD: lambda v: (
-        f"{v['tracks']} tracks of {v['groups']} people or groups do not tell its pose yet"
-        f" ({_sure_of_pose(v)}); more people help, and such as walk other ways"
+    ServiceCode.POSE_UNTOLD: lambda v: _(
+        "{tracks} tracks of {groups} people or groups do not tell its pose yet ({sure}); more "
+        "people help, and such as walk other ways",
+        sure=_sure_of_pose(v),
+        **v,
     ),
-    ServiceCode.POSE_PROPOSED: lambda v: (
-        f"{v['tracks']} tracks tell its pose ({_sure_of_pose(v)}); somebody has to agree to it"
+    ServiceCode.POSE_PROPOSED: lambda v: _(
+        "{tracks} tracks tell its pose ({sure}); somebody has to agree to it",
+        sure=_sure_of_pose(v),
+        **v,
     ),
-    ServiceCode.LEARNING_REFERENCE: "the reference is being learned",
+    ServiceCode.LEARNING_REFERENCE: N_("the reference is being learned"),
     ServiceCode.REFERENCE_TRACKS: lambda v: (
-        f"{v['counted']} of {v['wanted']} people for the reference"
+        _("{counted} of {wanted} people for the reference", **v)
         + (
-            f"; {v['pieces']} of {v['tracks']} tracks are pieces of others' walks"
+            "; " + _("{pieces} of {tracks} tracks are pieces of others' walks", **v)
             if v["pieces"]
             else ""
         )
     ),
     ServiceCode.TRACKS_SINCE: _since,
-    ServiceCode.LAST_IDENTIFIABLE: "when it was last told:",
+    ServiceCode.LAST_IDENTIFIABLE: N_("when it was last told:"),
     ServiceCode.MAINTENANCE: _maintenance,
-    ServiceCode.WITHOUT_PART: lambda v: f"without the {v['part'].replace('_', ' ')}: {v['why']}",
-    ServiceCode.BY_PICTURE: "by a picture of {taken_at}, nobody having walked by since",
-    ServiceCode.SITE_CHANGED: (
+    ServiceCode.WITHOUT_PART: lambda v: _(
+        "without the {part}: {why}", part=v["part"].replace("_", " "), why=v["why"]
+    ),
+    ServiceCode.BY_PICTURE: N_("by a picture of {taken_at}, nobody having walked by since"),
+    ServiceCode.SITE_CHANGED: N_(
         "the picture says that it stands, and people walk elsewhere: the site changed"
     ),
-    ServiceCode.PICTURE_SHIFTED: (
+    ServiceCode.PICTURE_SHIFTED: N_(
         "near and far things moved apart in the picture: the camera was moved aside, too, and how "
         "far it turned is known less well"
     ),
-    ServiceCode.PICTURE_FROZEN: "the same picture for {unchanged_s_in_h:.1f} h",
-    ServiceCode.PICTURE_BLACK: "its picture is black",
-    ServiceCode.PICTURE_BLINDED: "it is blinded: far more of its picture is white than ever",
-    ServiceCode.PICTURE_COVERED: "something covers its view",
-    ServiceCode.PICTURE_DEFOCUSED: "its picture is out of focus",
-    ServiceCode.PICTURE_UPSIDE_DOWN: "its picture is upside down",
-    ServiceCode.PICTURE_OTHER_SCENE: "its picture is of another scene: covered, or turned far",
+    ServiceCode.PICTURE_FROZEN: N_("the same picture for {unchanged_s_in_h:.1f} h"),
+    ServiceCode.PICTURE_BLACK: N_("its picture is black"),
+    ServiceCode.PICTURE_BLINDED: N_("it is blinded: far more of its picture is white than ever"),
+    ServiceCode.PICTURE_COVERED: N_("something covers its view"),
+    ServiceCode.PICTURE_DEFOCUSED: N_("its picture is out of focus"),
+    ServiceCode.PICTURE_UPSIDE_DOWN: N_("its picture is upside down"),
+    ServiceCode.PICTURE_OTHER_SCENE: N_("its picture is of another scene: covered, or turned far"),
     ServiceCode.SILENT_USUAL: _silent,
     ServiceCode.SILENT_UNUSUAL: _silent,
-    ServiceCode.SILENT_UNKNOWN: (
+    ServiceCode.SILENT_UNKNOWN: N_(
         "the newest track ended {silent_s_in_h:.1f} h ago; up to {limit_s_in_h:g} h are waited for"
     ),
     ServiceCode.MOVED_TOGETHER: _moved_together,
     ServiceCode.FELL_SILENT_TOGETHER: _silent_together,
     ServiceCode.OTHER_SOURCES: _other_sources,
-    ServiceCode.LOOKS_FAIL: (
+    ServiceCode.LOOKS_FAIL: N_(
         "its tracks cannot be looked at: {tries} tries failed in a row, the last with {error}"
     ),
-    ServiceCode.TRACKS_WAIT: lambda v: (
-        f"its tracks have waited for {v['waits_s'] / 60:.0f} min; up to {v['limit_s'] / 60:g} min "
-        "are waited for"
+    ServiceCode.TRACKS_WAIT: lambda v: _(
+        "its tracks have waited for {waits:.0f} min; up to {limit:g} min are waited for",
+        waits=v["waits_s"] / 60,
+        limit=v["limit_s"] / 60,
     ),
-    ServiceCode.TRACKS_LEFT_OUT: lambda v: (
-        f"{v['tracks']} of its tracks are not looked at, for a look would take too long of them: "
-        + ", ".join(f"{name!r}" for name in v["track_ids"])
-        + (" and others" if v["tracks"] > len(v["track_ids"]) else "")
+    ServiceCode.TRACKS_LEFT_OUT: lambda v: _(
+        "{tracks} of its tracks are not looked at, for a look would take too long of them: {names}",
+        names=", ".join(f"{name!r}" for name in v["track_ids"])
+        + (_(" and others") if v["tracks"] > len(v["track_ids"]) else ""),
+        **v,
     ),
-    ServiceCode.DISABLED_BY_PERSON: "disabled by a person",
-    ServiceCode.ENDPOINT_GONE: "it answered 410: it is gone for good",
-    ServiceCode.ENDPOINT_FAILS: "it failed for more than {patience_s_in_h:g} h: {error}",
-    ServiceCode.SECRET_LOST: (
+    ServiceCode.DISABLED_BY_PERSON: N_("disabled by a person"),
+    ServiceCode.ENDPOINT_GONE: N_("it answered 410: it is gone for good"),
+    ServiceCode.ENDPOINT_FAILS: N_("it failed for more than {patience_s_in_h:g} h: {error}"),
+    ServiceCode.SECRET_LOST: N_(
         "its secret was lost with the key: fetch a new one, tell the receiver, enable it"
     ),
 }

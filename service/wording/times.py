@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
 
-from babel.dates import format_timedelta
+from babel.dates import format_timedelta, get_day_names, get_month_names
+
+from service.wording.language import _, spoken
 
 _AT_LEAST = 1.5  # of a unit, to say a length of time in it: "90 minutes", then "2 hours"
 _JUST_NOW = timedelta(seconds=10), timedelta(minutes=1)  # before and after now
@@ -24,13 +26,14 @@ class Clock:
         if days == 0:
             return clock
         if days == 1:
-            return f"{clock} yesterday"
+            return _("{time} yesterday", time=clock)
         if days == -1:
-            return f"{clock} tomorrow"
+            return _("{time} tomorrow", time=clock)
         if 1 < days < 7:
-            return f"{clock} on {local:%A}"
+            day = get_day_names("wide", locale=spoken())[local.weekday()]
+            return _("{time} on {day}", time=clock, day=day)
         year = "" if local.year == today.year else f" {local.year}"
-        return f"{local.day} {local:%b}{year}, {clock}"
+        return f"{day_and_month(local)}{year}, {clock}"
 
     def in_full(self, at: datetime) -> str:
         """A time with its date and zone."""
@@ -39,12 +42,13 @@ class Clock:
     def dated(self, at: datetime) -> str:
         """A time with its day, that is read weeks later: "Mon 23 Nov, 14:32"."""
         local = at.astimezone(self.zone)
-        return f"{local:%a} {local.day} {local:%b}, {local:%H:%M}"
+        day = get_day_names("abbreviated", locale=spoken())[local.weekday()]
+        return f"{day} {day_and_month(local)}, {local:%H:%M}"
 
     def day(self, at: datetime) -> str:
         """A day: "23 Nov 2026"."""
         local = at.astimezone(self.zone)
-        return f"{local.day} {local:%b} {local.year}"
+        return f"{day_and_month(local)} {local.year}"
 
     def iso_day(self, at: datetime) -> str:
         """The same as addresses and forms have it."""
@@ -53,19 +57,25 @@ class Clock:
     def ago(self, at: datetime) -> str:
         """An age, or in how long a time comes; `times.js` says the same as time goes on."""
         if self.now - _JUST_NOW[0] < at <= self.now + _JUST_NOW[1]:
-            return "just now"
+            return _("just now")
         # A whole number, since of a timedelta it would take the second before.
         seconds = round((at - self.now).total_seconds())
-        return format_timedelta(seconds, threshold=_AT_LEAST, add_direction=True, locale="en")
+        return format_timedelta(seconds, threshold=_AT_LEAST, add_direction=True, locale=spoken())
 
     def of(self, seconds: float) -> datetime:
         """The time of seconds since the epoch."""
         return from_seconds(seconds)
 
 
+def day_and_month(local: datetime) -> str:
+    """A day: "23 Nov"."""
+    month = get_month_names("abbreviated", locale=spoken())[local.month]
+    return _("{day} {month}", day=local.day, month=month)
+
+
 def duration(seconds: float) -> str:
     """A length of time, roughly: "40 seconds", "12 minutes", "3 hours", "4 days"."""
-    return format_timedelta(round(max(seconds, 0.0)), threshold=_AT_LEAST, locale="en")
+    return format_timedelta(round(max(seconds, 0.0)), threshold=_AT_LEAST, locale=spoken())
 
 
 def from_seconds(at_s: float) -> datetime:

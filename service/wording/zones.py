@@ -5,12 +5,13 @@ from typing import Any
 
 from models.quantiles import Z90
 from service.enums import ZoneOn
+from service.wording.language import N_, _, _n
 
 _APPLIED = {
-    "frigate": (
+    "frigate": N_(
         "Have them in place of this camera's in Frigate's configuration, and restart Frigate."
     ),
-    "axis": "Have the camera take them by setConfiguration.",
+    "axis": N_("Have the camera take them by setConfiguration."),
 }
 _MANY = 0.995  # of a share that is told as whole
 
@@ -24,16 +25,19 @@ def zone_words(on: ZoneOn, *, overlap: float, in_view: float) -> str:
         in_view: the share of it that the picture shows.
     """
     if in_view <= 0:
-        return "none of it is in the picture any more"
-    where = "on the ground" if on == ZoneOn.GROUND else "of it"
+        return _("none of it is in the picture any more")
+    share = f"{100 * overlap:.0f}"
     if overlap >= _MANY:
-        words = "all still lies where it was drawn"
+        words = _("all still lies where it was drawn")
     elif overlap < 1 - _MANY:
-        words = "nothing lies where it was drawn"
+        words = _("nothing lies where it was drawn")
+    elif on == ZoneOn.GROUND:
+        words = _("{share} % on the ground still lies where it was drawn", share=share)
     else:
-        words = f"{100 * overlap:.0f} % {where} still lies where it was drawn"
+        words = _("{share} % of it still lies where it was drawn", share=share)
     if in_view < _MANY:
-        words += f", {100 * (1 - in_view):.0f} % has left the picture"
+        gone = f"{100 * (1 - in_view):.0f}"
+        words += ", " + _("{share} % has left the picture", share=gone)
     return words
 
 
@@ -41,12 +45,27 @@ def count_words(crossed: int | None, missed: int | None, false_counts: int | Non
     """The people of a line as it was drawn, in words; nothing of an area or of nobody."""
     said = []
     if crossed:
-        whom = "none" if missed == 0 else "all" if missed == crossed else str(missed)
-        were = "was" if missed == 1 else "were"
-        said.append(f"of the last {crossed} who crossed it, {whom} {were} missed")
+        if missed == 0:
+            said.append(_("of the last {all} who crossed it, none were missed", all=crossed))
+        elif missed == crossed and missed != 1:
+            said.append(_("of the last {all} who crossed it, all were missed", all=crossed))
+        else:
+            said.append(
+                _n(
+                    "of the last {all} who crossed it, {n} was missed",
+                    "of the last {all} who crossed it, {n} were missed",
+                    missed or 0,
+                    all=crossed,
+                )
+            )
     if false_counts:
-        were = "was" if false_counts == 1 else "were"
-        said.append(f"{false_counts} {were} counted who did not cross it")
+        said.append(
+            _n(
+                "{n} was counted who did not cross it",
+                "{n} were counted who did not cross it",
+                false_counts,
+            )
+        )
     return ", ".join(said)
 
 
@@ -59,11 +78,11 @@ def moved_zone_words(moved: Mapping[str, Any]) -> str:
 
 def apply_words(form: str | None) -> str:
     """How zones that are mended come to count in the system that they are of, in a sentence."""
-    return _APPLIED.get(form or "", "Have them in place of those that were drawn.")
+    return _(_APPLIED.get(form or "", N_("Have them in place of those that were drawn.")))
 
 
 def corner_words(worst_px: float | None) -> str:
     """How sure mended corners are, by the major semi-axis of the least sure one; maybe nothing."""
     if worst_px is None:
         return ""
-    return f"mended corners are sure to ±{max(Z90 * worst_px, 1):.0f} px"
+    return _("mended corners are sure to ±{px:.0f} px", px=max(Z90 * worst_px, 1.0))

@@ -14,6 +14,8 @@ from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 from starlette.types import Scope
 
+from service.wording import language
+
 _WEB = Path(__file__).parents[2] / "pages"
 _STATIC = _WEB / "static"
 _MEDIA_TYPES = {".js": "text/javascript", ".css": "text/css"}
@@ -24,6 +26,7 @@ HEADERS = {
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
     "Referrer-Policy": "same-origin",
     "Cache-Control": "no-store",
+    "Vary": "Accept-Encoding, Accept-Language, Cookie",
 }
 
 
@@ -57,7 +60,17 @@ def _fingerprint() -> str:
 
 STATIC_URL = f"/ui/static/{_fingerprint()}"
 templates = Jinja2Templates(directory=_WEB / "templates")
-templates.env.globals["static"] = STATIC_URL
+templates.env.add_extension("jinja2.ext.i18n")
+templates.env.install_gettext_callables(  # type: ignore[attr-defined]
+    language.gettext, language.ngettext, newstyle=True
+)
+templates.env.globals |= {
+    "static": STATIC_URL,
+    "languages": language.LANGUAGES,
+    "number": language.number,
+    "script_words": language.script_words,
+    "spoken": language.spoken,
+}
 templates.env.trim_blocks = templates.env.lstrip_blocks = True
 
 
@@ -85,14 +98,14 @@ def wants_page(request: Request) -> bool:
 
 def render(request: Request, template: str, status: int = 200, **context: Any) -> HTMLResponse:
     """A page, or a part of one, out of a template; everything in it is escaped."""
+    headers = {**HEADERS, "Content-Language": language.spoken()}
     page = templates.TemplateResponse(
-        request, template, context, status_code=status, headers=HEADERS
+        request, template, context, status_code=status, headers=headers
     )
     if len(page.body) > _LARGE and "gzip" in request.headers.get("accept-encoding", ""):
         page.body = gzip.compress(page.body, compresslevel=4)
         page.headers["Content-Encoding"] = "gzip"
         page.headers["Content-Length"] = str(len(page.body))
-        page.headers["Vary"] = "Accept-Encoding"
     return page
 
 

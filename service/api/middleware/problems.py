@@ -19,6 +19,7 @@ from models.errors import CalibrationError
 from service.api.middleware import pages
 from service.errors import FieldError, ServiceError
 from service.store.engines.failures import failure_of
+from service.wording.language import N_, _
 
 log = logging.getLogger("surefoot.http")
 
@@ -34,7 +35,9 @@ FORESEEN = (
 _OF_ALL = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin"}
 # What a person can do about what a program reads in the detail.
 _FOR_PEOPLE = {
-    403: "You may look, but not do this. Whoever looks after the service can give you the right."
+    403: N_(
+        "You may look, but not do this. Whoever looks after the service can give you the right."
+    )
 }
 _MOST_ERRORS = 20  # of one body
 _BRIEF = reprlib.Repr()
@@ -83,7 +86,7 @@ def problem(request: Request, error: ServiceError) -> Response:
     if error.retry_after_s is not None:
         headers["Retry-After"] = str(max(1, round(error.retry_after_s)))
     if pages.wants_page(request):
-        said = _FOR_PEOPLE.get(status, error.detail)
+        said = _(_FOR_PEOPLE[status]) if status in _FOR_PEOPLE else error.detail
         page = pages.render(request, "problem.html", status, title=title, detail=said)
         page.headers.update(headers)
         return page

@@ -18,6 +18,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "GET /healthz",
         "GET /readyz",
         "GET /ui/login",
+        "POST /ui/language",
         "POST /ui/login",
     ),
     TokenScope.INGEST: ("POST /cameras/{camera_id}/tracks",),

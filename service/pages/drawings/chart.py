@@ -9,6 +9,8 @@ from typing import Literal
 from markupsafe import Markup, escape
 
 from service.pages.drawings.svg_paths import svg
+from service.wording.language import number
+from service.wording.times import day_and_month
 
 _WIDTH, _HEIGHT = 400.0, 130.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 42.0, 4.0, 12.0, 18.0
@@ -79,8 +81,8 @@ class TimeAxis:
         for n in range(int((self.to_s - first) // step) + 1):
             local = self._local(first + n * step)
             midnight = (local.hour, local.minute) == (0, 0)
-            day = f"{local.day} {local:%b}"
-            found.append((first + n * step, day if step >= _DAY or midnight else f"{local:%H:%M}"))
+            words = day_and_month(local) if step >= _DAY or midnight else f"{local:%H:%M}"
+            found.append((first + n * step, words))
         return found
 
     def _local(self, at_s: float) -> datetime:
@@ -114,7 +116,7 @@ class ValueAxis:
         digits = max(-math.floor(math.log10(step) + 1e-9), 0)
         first = math.ceil(self.low / step)
         return [
-            (n * step, f"{n * step:.{digits}f}".replace("-", "\N{MINUS SIGN}"))
+            (n * step, number(n * step, f".{digits}f").replace("-", "\N{MINUS SIGN}"))
             for n in range(first, math.floor(self.high / step) + 1)
         ]
 

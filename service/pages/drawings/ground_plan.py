@@ -17,6 +17,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from service.pages.drawings.picture import Overlay, ground_of
 from service.pages.drawings.svg_paths import Frame, path_data, svg
+from service.wording.language import _, number
 
 SIZE_PX = 640.0
 _MARGIN_PX, _TRIED_MARGIN_PX = 18.0, 20.0
@@ -105,7 +106,7 @@ def tried_ground_svg(lens: Intrinsics, pose: CameraPose, tracks: Sequence[Array]
         f'<path class="track" d="{drawn}"/>',
         f'<circle class="foot" cx="{u:.1f}" cy="{v:.1f}" r="7"/>',
     ]
-    label = f"The ground from above; a square is {view.spacing_m:g} m"
+    label = _("The ground from above; a square is {m:g} m", m=view.spacing_m)
     return svg("picture", f"0 0 {SIZE_PX:.0f} {SIZE_PX:.0f}", label, parts)
 
 
@@ -173,5 +174,5 @@ def scale_bar(plan: Plan) -> str:
     left, y, wide = 12.0, HEIGHT_PX - 8, length * plan.px_per_m
     return (
         f'<path class="mark" d="M{left} {y - 5:.1f}V{y:.1f}H{left + wide:.1f}V{y - 5:.1f}"/>'
-        f'<text class="halo" x="{left + wide + 8:.1f}" y="{y:.1f}">{length:g} m</text>'
+        f'<text class="halo" x="{left + wide + 8:.1f}" y="{y:.1f}">{number(length, "g")} m</text>'
     )

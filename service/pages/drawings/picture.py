@@ -20,6 +20,7 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from service.pages.drawings.svg_paths import Frame, path_data, svg
+from service.wording.language import _
 
 _SPACINGS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 _LINES = 20  # about so many lie across the view
@@ -96,8 +97,7 @@ def ground_of(lens: Intrinsics, pose: CameraPose) -> Ground | None:
 
 def horizon_path(lens: Intrinsics, pose: CameraPose) -> str:
     """The horizon in a picture, as path data; empty where it is not in it."""
-    uv, _ = horizon_pixels(lens, pose)
-    return path_data([uv], picture_frame(lens))
+    return path_data([horizon_pixels(lens, pose)[0]], picture_frame(lens))
 
 
 def grid_path(lens: Intrinsics, pose: CameraPose, ground: Ground) -> str:
@@ -148,9 +148,10 @@ def picture_svg(
         parts.append(f'<path class="horizon {overlay.kind}" d="{drawn}"/>')
         seen = seen or bool(drawn)
     if not seen:
+        words = escape(_("nothing but sky"))
         parts.append(
             f'<text class="nothing" x="{lens.width / 2:.0f}" y="{lens.height / 2:.0f}" '
-            f'text-anchor="middle" font-size="{lens.width / 24:.0f}">nothing but sky</text>'
+            f'text-anchor="middle" font-size="{lens.width / 24:.0f}">{words}</text>'
         )
     parts += over
     for kind, some in (("track then", before), ("track now" if before else "track", tracks)):

@@ -18,6 +18,7 @@ from service.pages.drawings.ground_plan import (
     scale_bar,
 )
 from service.pages.drawings.svg_paths import path_data
+from service.wording.language import _n
 
 _SEEN = REACH / 2  # camera heights: of views that reach farther, none could be told apart
 _NAMED = 40  # cameras: more names hide one another, and the list has them
@@ -60,7 +61,11 @@ def site_map_svg(found: Sequence[SiteCamera]) -> Markup:
     # Those that need nobody below those that do.
     order = sorted(found, key=lambda each: each.now is not None)
     parts = [_camera(plan, each, views[each.id], named=named) for each in order]
-    label = f"The ground from above, +Y up, with {len(found)} cameras and what each sees."
+    label = _n(
+        "The ground from above, +Y up, with {n} camera and what it sees.",
+        "The ground from above, +Y up, with {n} cameras and what each sees.",
+        len(found),
+    )
     return Markup(
         f'<svg class="plan site" viewBox="0 0 {SIZE_PX:.0f} {HEIGHT_PX:.0f}" role="group" '
         f'aria-label="{label}">{"".join([*parts, north(), scale_bar(plan)])}</svg>'

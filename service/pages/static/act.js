@@ -1,5 +1,7 @@
 // Calls of the JSON API, and what became of them, in words.
 
+import { _, language } from "./words.js";
+
 /** An answer that is no success: `problem` is its document (RFC 9457). */
 export class Refused extends Error {
   constructor(problem) {
@@ -23,12 +25,12 @@ export async function call(method, url, body, headers = {}) {
   try {
     answer = await fetch(url, given);
   } catch {
-    throw new Refused({ title: "No answer", detail: "The service does not answer. Is it running?" });
+    throw new Refused({ title: _("No answer"), detail: _("The service does not answer. Is it running?") });
   }
   const isJson = answer.status !== 204 && (answer.headers.get("Content-Type") || "").includes("json");
   const document = isJson ? await answer.json() : null;
   if (answer.ok) return document;
-  throw new Refused(document ?? { title: `Error ${answer.status}`, detail: answer.statusText });
+  throw new Refused(document ?? { title: _("Error {status}", { status: answer.status }), detail: answer.statusText });
 }
 
 /** The answer to a file that is sent; it throws as `call` does. */
@@ -42,9 +44,9 @@ export async function sendFile(url, file) {
 
 // What a person can do about an answer that programs read.
 const PLAIN = {
-  401: "You are not logged in any more. Log in again, in another tab if you have typed much.",
-  403: "You may look, but not do this. Whoever looks after the service can give you the right.",
-  409: "Somebody was faster, or it is not so any more: ",
+  401: _("You are not logged in any more. Log in again, in another tab if you have typed much."),
+  403: _("You may look, but not do this. Whoever looks after the service can give you the right."),
+  409: _("Somebody was faster, or it is not so any more:") + " ",
 };
 
 /** A reason as a person says it: without the field's name, what was typed, and times of machines. */
@@ -53,7 +55,7 @@ export function plainly(reason, zone = document.body.dataset.zone) {
     .replace(/^[a-z_.]+: /, "")
     .replace(/, got (\[.*\]|[^,]*)$/, "")
     .replace(/\d{4}-\d\d-\d\dT[\d:.]+(Z|[+-]\d\d:\d\d)/g, (at) =>
-      new Intl.DateTimeFormat("en-GB", { timeZone: zone, dateStyle: "medium", timeStyle: "short" }).format(new Date(at)),
+      new Intl.DateTimeFormat(language === "en" ? "en-GB" : language, { timeZone: zone, dateStyle: "medium", timeStyle: "short" }).format(new Date(at)),
     );
   return words[0].toUpperCase() + words.slice(1) + (/[.!?]$/.test(words) ? "" : ".");
 }
@@ -63,9 +65,9 @@ export function showProblem(error) {
   const { status, detail } = error.problem ?? { detail: String(error) };
   const said = PLAIN[status] ?? "";
   const dialog = document.getElementById("problem");
-  document.getElementById("problem-title").textContent = "That was not done";
+  document.getElementById("problem-title").textContent = _("That was not done");
   document.getElementById("problem-detail").textContent =
-    status === 409 ? said + plainly(detail) : said || plainly(detail ?? "no reason was given");
+    status === 409 ? said + plainly(detail) : said || plainly(detail ?? _("no reason was given"));
   const reasons = error.problem?.errors?.length > 1 ? error.problem.errors : [];
   document.getElementById("problem-errors").replaceChildren(
     ...reasons.map(({ pointer, reason }) => {

@@ -2,6 +2,7 @@
 
 import { announce, guarded } from "./act.js";
 import { ask, signed } from "./dialogs.js";
+import { _ } from "./words.js";
 import { instant, tomorrow } from "./zoned.js";
 
 const path = (alert, act) => `/alerts/${encodeURIComponent(alert)}/${act}`;
@@ -23,17 +24,17 @@ export const ALERT_ACTS = {
   },
 
   acknowledge({ alert }) {
-    return done("Acknowledged.", signed("POST", path(alert, "acknowledge")));
+    return done(_("Acknowledged."), signed("POST", path(alert, "acknowledge")));
   },
 
   silence({ alert }) {
     return ask("silence-dialog", {
-      send: (said) => done("Silenced.", signed("POST", path(alert, "silence"), silenceOf(said))),
+      send: (said) => done(_("Silenced."), signed("POST", path(alert, "silence"), silenceOf(said))),
     });
   },
 
   unsilence({ alert }) {
-    return done("The silence has ended.", signed("POST", path(alert, "silence"), { until: null }));
+    return done(_("The silence has ended."), signed("POST", path(alert, "silence"), { until: null }));
   },
 };
 

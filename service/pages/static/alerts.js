@@ -5,6 +5,7 @@ import { ALERT_ACTS, listen } from "./alert_acts.js";
 import { answer, offer as offerFor, withMany } from "./bulk_acts.js";
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
+import { _ } from "./words.js";
 
 const list = document.getElementById("alerts");
 const bulk = document.getElementById("bulk");
@@ -73,7 +74,7 @@ subscribe(
     gathered((events) => {
       again();
       const news = events.findLast(({ data }) => data.message === "alert.opened");
-      if (news) announce(`A new alert: ${news.data.camera_id ?? news.data.track_source}`);
+      if (news) announce(_("A new alert: {name}", { name: news.data.camera_id ?? news.data.track_source }));
     }, 300),
   ),
 );

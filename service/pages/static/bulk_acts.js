@@ -4,6 +4,7 @@
 import { Refused, announce, call, guarded, plainly } from "./act.js";
 import { planMaintenance, silenceOf } from "./alert_acts.js";
 import { ask, signed, wordsIn } from "./dialogs.js";
+import { _, _n } from "./words.js";
 
 const AT_ONCE = 500;
 const OF_ALERTS = ["resolve", "acknowledge", "silence"];
@@ -36,12 +37,15 @@ function mixture(items) {
   const [, ...fewer] = [...counts].sort(([, a], [, b]) => b - a);
   const parts = fewer.map(([kinds, count], at) => {
     const words = kinds.split(" ").map((kind) => RULE.kinds[kind].words[count === 1 ? 0 : 1]);
-    return `${count}${at ? "" : ` of ${items.length}`} ${words.join(" and ")}`;
+    const said = { n: count, all: items.length, are: words.join(_(" and ")) };
+    return at ? _("{n} {are}", said) : _("{n} of {all} {are}", said);
   });
-  return `${parts.join(", ")}: choose ${fewer.length === 1 && fewer[0][1] === 1 ? "it" : "them"} apart.`;
+  const [one] = fewer.length === 1 ? fewer[0].slice(1) : [0];
+  return _n("{some}: choose it apart.", "{some}: choose them apart.", one, { some: parts.join(", ") });
 }
 
-const counted = (count, noun) => (count === 1 ? `1 ${noun}` : `${count} ${noun}s`);
+const counted = (n, noun) =>
+  noun === "camera" ? _n("{n} camera", "{n} cameras", n) : _n("{n} alert", "{n} alerts", n);
 
 // --- What is done --------------------------------------------------------------------------------
 
@@ -90,14 +94,16 @@ async function actOn(act, targets, items, more = {}) {
 function sayDone(word, items, refused, undo) {
   const cameras = new Set(items.map(({ camera }) => camera).filter(Boolean));
   const all = (items.length === 1 && items[0].name) || counted(items.length, cameras.size === items.length ? "camera" : "alert");
-  const some = refused.size ? `${items.length - refused.size} of ${all}` : all;
+  const some = refused.size ? _("{n} of {all}", { n: items.length - refused.size, all }) : all;
   const reasons = new Map();
   for (const problem of refused.values()) {
     const why = problem.detail.startsWith(ANSWERED.detail) ? "" : plainly(problem.detail);
     reasons.set(why, (reasons.get(why) ?? 0) + 1);
   }
   const others = [...reasons].map(([why, count]) =>
-    why ? `${count} not: ${why.replace(/\.$/, "")}` : `${count} ${count === 1 ? "was" : "were"} answered meanwhile`,
+    why
+      ? _("{n} not: {why}", { n: count, why: why.replace(/\.$/, "") })
+      : _n("{n} was answered meanwhile", "{n} were answered meanwhile", count),
   );
   offerUndo(`${word}: ${[some, ...others].join("; ")}.`, undo);
 }
@@ -122,7 +128,7 @@ function offerUndo(words, undo) {
   const back = async () => {
     if ((await actOn("undo", items.map((item) => [item.camera, item]), items)) !== undefined) close();
   };
-  place.replaceChildren(said, buttonOf("Undo", "", back), buttonOf("×", "Close", close));
+  place.replaceChildren(said, buttonOf(_("Undo"), "", back), buttonOf("×", _("Close"), close));
   over = setTimeout(close, Date.parse(undo.until) - Date.now());
 }
 
@@ -139,7 +145,7 @@ function buttonOf(words, label, what) {
 function tagsOf({ add, remove }) {
   const more = { add: wordsIn(add), remove: wordsIn(remove) };
   if (more.add.length || more.remove.length) return more;
-  throw new Refused({ errors: [{ pointer: "/add", reason: "a word is needed, here or below" }] });
+  throw new Refused({ errors: [{ pointer: "/add", reason: _("a word is needed, here or below") }] });
 }
 
 /** The open alerts that take an act, each with the item that it is, or whose camera it is about. */

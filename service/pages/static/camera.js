@@ -5,6 +5,7 @@ import { ALERT_ACTS, done, listen, planMaintenance } from "./alert_acts.js";
 import { myName, nameMe, signed } from "./dialogs.js";
 import { debounced, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
+import { _ } from "./words.js";
 
 const root = document.getElementById("camera");
 const camera = root.dataset.camera;
@@ -21,7 +22,7 @@ async function refresh() {
   // Somebody has removed it; another may come under its id.
   root.hidden = answer.status === 404;
   document.getElementById("removed").hidden = !root.hidden;
-  if (root.hidden) document.title = "Removed · surefoot";
+  if (root.hidden) document.title = `${_("Removed")} · surefoot`;
   if (!answer.ok || answer.redirected) return;
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
   document.title = fresh.title;
@@ -68,10 +69,10 @@ keepTimes(document.querySelector('[data-part="summary"]'));
 
 function showName() {
   for (const place of document.querySelectorAll("[data-by]")) {
-    place.textContent = myName() || "nobody yet";
+    place.textContent = myName() || _("nobody yet");
   }
   const answered = document.querySelector("[data-who]");
-  if (answered && myName() && answered.dataset.who === myName()) answered.textContent = "You";
+  if (answered && myName() && answered.dataset.who === myName()) answered.textContent = _("You");
 }
 
 /** Do something in somebody's name, and show what came of it. */
@@ -81,66 +82,68 @@ document.addEventListener("acted", () => refresh().catch(() => {}));
 
 const ACTS = {
   ...ALERT_ACTS,
-  accept: () => put("New aim kept.", "POST", `${path}/pose/accept`),
-  "put-back": () => put("Put back.", "POST", `${path}/pose/put-back`),
-  relearn: () => put("Being learned anew.", "POST", `${path}/reference/reset`),
-  undo: () => put("Undone.", "POST", `${path}/pose/undo`),
+  accept: () => put(_("New aim kept."), "POST", `${path}/pose/accept`),
+  "put-back": () => put(_("Put back."), "POST", `${path}/pose/put-back`),
+  relearn: () => put(_("Being learned anew."), "POST", `${path}/reference/reset`),
+  undo: () => put(_("Undone."), "POST", `${path}/pose/undo`),
 
   async agree() {
     const yes = await confirmed({
-      title: "Does it look right?",
-      detail:
+      title: _("Does it look right?"),
+      detail: _(
         "The pose that people told becomes the prior pose, as sure as it is. Look whether the " +
-        "horizon and the grid lie on the ground; a still image behind them helps. Moves are told " +
-        "against it from then on.",
-      yes: "Agree to it",
+          "horizon and the grid lie on the ground; a still image behind them helps. Moves are told " +
+          "against it from then on.",
+      ),
+      yes: _("Agree to it"),
     });
     if (yes && (await signed("POST", `${path}/pose/agree`)) !== undefined) location.reload();
   },
 
   async "use-source"({ source }) {
     const yes = await confirmed({
-      title: `Let the tracks of ${source} count?`,
-      detail:
+      title: _("Let the tracks of {source} count?", { source }),
+      detail: _(
         "The camera is judged by this source alone from now on. Its reference is learned anew, " +
-        "of tracks that were seen while the camera was where it should be.",
-      yes: "Let it count",
+          "of tracks that were seen while the camera was where it should be.",
+      ),
+      yes: _("Let it count"),
     });
     const url = `${path}/sources/${encodeURIComponent(source)}/use`;
-    if (yes) await put("It counts from now on.", "POST", url);
+    if (yes) await put(_("It counts from now on."), "POST", url);
   },
 
   async train() {
-    await done("A training is queued.", call("POST", `${path}/trainings`, myName() ? { by: myName() } : {}));
+    await done(_("A training is queued."), call("POST", `${path}/trainings`, myName() ? { by: myName() } : {}));
   },
 
   async cancel({ training }) {
     const yes = await confirmed({
-      title: "Cancel the training?",
-      detail: "What it has learned so far is lost. The model in use stays in use.",
-      yes: "Cancel the training",
+      title: _("Cancel the training?"),
+      detail: _("What it has learned so far is lost. The model in use stays in use."),
+      yes: _("Cancel the training"),
     });
-    if (yes) await done("The training is cancelled.", call("DELETE", `/trainings/${training}`));
+    if (yes) await done(_("The training is cancelled."), call("DELETE", `/trainings/${training}`));
   },
 
-  maintain: () => planMaintenance((body) => put("Maintenance planned.", "POST", `${path}/maintenance`, body)),
+  maintain: () => planMaintenance((body) => put(_("Maintenance planned."), "POST", `${path}/maintenance`, body)),
 
   async "end-window"({ window: id, state }) {
     const yes = await confirmed({
-      title: state === "under way" ? "End the maintenance now?" : "Take the maintenance back?",
+      title: state === "under way" ? _("End the maintenance now?") : _("Take the maintenance back?"),
       detail:
         state === "under way"
-          ? "The camera is judged again by people who come from now on."
-          : "The camera will be judged then as ever.",
-      yes: state === "under way" ? "End it now" : "Take it back",
+          ? _("The camera is judged again by people who come from now on.")
+          : _("The camera will be judged then as ever."),
+      yes: state === "under way" ? _("End it now") : _("Take it back"),
     });
     if (!yes || !(await nameMe())) return;
     const who = myName() ? `?by=${encodeURIComponent(myName())}` : "";
-    await done("Done.", call("DELETE", `${path}/maintenance/${id}${who}`));
+    await done(_("Done."), call("DELETE", `${path}/maintenance/${id}${who}`));
   },
 
   async "still-remove"() {
-    await done("The still image is deleted.", call("DELETE", `${path}/snapshot`));
+    await done(_("The still image is deleted."), call("DELETE", `${path}/snapshot`));
   },
 
   async name() {
@@ -163,7 +166,7 @@ root.addEventListener("input", ({ target }) => {
 
 async function sendStill(file) {
   await sendFile(`${path}/snapshot`, file);
-  announce("The still image is kept.");
+  announce(_("The still image is kept."));
   await refresh();
 }
 

@@ -2,6 +2,7 @@
 
 import { announce, call, guarded, Refused } from "./act.js";
 import { refreshSoon } from "./camera.js";
+import { _ } from "./words.js";
 
 const panel = document.getElementById("connect");
 const live = document.getElementById("posts");
@@ -39,7 +40,7 @@ async function look() {
 
 function finish() {
   clearInterval(timer);
-  announce("The reference is learned.");
+  announce(_("The reference is learned."));
   refreshSoon();
   panel.remove();
 }
@@ -59,22 +60,22 @@ function showSource() {
 
 async function makeToken() {
   const camera = document.getElementById("camera").dataset.camera;
-  const body = { name: `tracks of ${camera}`, scopes: ["ingest"], cameras: [camera] };
+  const body = { name: _("tracks of {camera}", { camera }), scopes: ["ingest"], cameras: [camera] };
   token = (await call("POST", "/tokens", body)).token;
   for (const place of panel.querySelectorAll("[data-token]")) place.textContent = token;
   document.getElementById("made-token").hidden = false;
-  announce("The token is made, and stands in the commands.");
+  announce(_("The token is made, and stands in the commands."));
 }
 
 async function copy(name) {
   const pre = document.getElementById(name);
   try {
     await navigator.clipboard.writeText(pre.textContent);
-    announce("Copied.");
+    announce(_("Copied."));
   } catch {
     // Plain HTTP has no clipboard: what is to be copied is chosen, at least.
     getSelection().selectAllChildren(pre);
-    announce("Chosen: copy it with the keyboard.");
+    announce(_("Chosen: copy it with the keyboard."));
   }
 }
 
@@ -94,23 +95,24 @@ function addressOf(type) {
 
 async function post(file) {
   const type = TYPES[file.name.split(".").at(-1).toLowerCase()];
-  if (!type) throw refused(`${file.name}: a file that ends in .json, .ndjson, .csv or .txt is needed.`);
+  if (!type) throw refused(_("{name}: a file that ends in .json, .ndjson, .csv or .txt is needed.", { name: file.name }));
   if (panel.dataset.posts === "no" && !token) {
-    throw refused("Who is logged in here may not post tracks: make a token first, or use a command.");
+    throw refused(_("Who is logged in here may not post tracks: make a token first, or use a command."));
   }
-  says.textContent = `Posting ${file.name}…`;
+  says.textContent = _("Posting {name}…", { name: file.name });
   const headers = { Accept: "application/json", "Content-Type": type };
   if (token) headers.Authorization = `Bearer ${token}`;
   const answer = await fetch(addressOf(type), { method: "POST", headers, body: file });
   const body = await answer.json();
   if (!answer.ok) throw new Refused(body);
   const { accepted, duplicates, rejected, left_out } = body;
-  const parts = [`${accepted} taken`, `${duplicates} known before`, `${rejected.length} refused`];
-  if (left_out) parts.push(`${left_out} of no person left out`);
+  const counts = { taken: accepted, known: duplicates, refused: rejected.length };
+  const parts = [_("{taken} taken, {known} known before, {refused} refused", counts)];
+  if (left_out) parts.push(_("{n} of no person left out", { n: left_out }));
   says.textContent = `${file.name}: ${parts.join(", ")}.`;
 }
 
-const refused = (detail) => new Refused({ title: "Not posted", detail });
+const refused = (detail) => new Refused({ title: _("Not posted"), detail });
 
 async function send(file) {
   if (!file) return;

@@ -4,6 +4,7 @@
 import { Refused, call } from "./act.js";
 import { done, listen } from "./alert_acts.js";
 import { ask, myName, nameMe, wordsIn } from "./dialogs.js";
+import { _ } from "./words.js";
 
 const root = document.getElementById("camera");
 const path = `/cameras/${encodeURIComponent(root.dataset.camera)}`;
@@ -23,7 +24,7 @@ async function send(version, method, url, body) {
   } catch (error) {
     if (error.problem?.status !== 412) throw error;
     version.etag = error.problem.etag;
-    throw new Refused({ detail: "somebody changed it meanwhile; once more, and it is done all the same" });
+    throw new Refused({ detail: _("somebody changed it meanwhile; once more, and it is done all the same") });
   }
 }
 
@@ -42,7 +43,7 @@ async function edit() {
       if (!(await nameMe())) return undefined;
       if ("tags" in body) body.tags = wordsIn(body.tags);
       if (myName()) body.by = myName();
-      return done("Changed.", send(version, "PATCH", path, body));
+      return done(_("Changed."), send(version, "PATCH", path, body));
     },
   });
 }
@@ -53,7 +54,7 @@ async function remove() {
   document.getElementById("remove-name").textContent = name;
   const gone = await ask("remove-dialog", {
     async send({ typed }) {
-      if (typed.trim() !== name.trim()) throw new Refused({ errors: [{ pointer: "/typed", reason: `its name, ${name}, is needed` }] });
+      if (typed.trim() !== name.trim()) throw new Refused({ errors: [{ pointer: "/typed", reason: _("its name, {name}, is needed", { name }) }] });
       if (!(await nameMe())) return undefined;
       const who = myName() ? `?by=${encodeURIComponent(myName())}` : "";
       return send(version, "DELETE", path + who);

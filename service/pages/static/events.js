@@ -1,5 +1,7 @@
 // What happens, as it happens: one EventSource a page, which comes back by itself.
 
+import { _ } from "./words.js";
+
 const TYPES = ["pose", "alert", "training"];
 const AGAIN_MS = 3000;
 
@@ -62,7 +64,7 @@ export function showState(state) {
   document.dispatchEvent(new CustomEvent("live"));
   place.hidden = false;
   place.dataset.state = state;
-  place.querySelector(".live-words").textContent = state === "on" ? "Live" : "Reconnecting…";
+  place.querySelector(".live-words").textContent = state === "on" ? _("Live") : _("Reconnecting…");
 }
 
 /** A function that calls `what` once with all that was given within `wait_ms` of the first. */

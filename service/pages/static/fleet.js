@@ -8,6 +8,7 @@ import { signed } from "./dialogs.js";
 import { gathered, subscribe } from "./events.js";
 import { showPlaces, within } from "./places.js";
 import { keepTimes } from "./times.js";
+import { _, _n } from "./words.js";
 
 const list = document.getElementById("rows");
 const search = document.getElementById("search");
@@ -97,11 +98,11 @@ function say(cameras) {
   }
   document.title = (waiting ? `(${waiting}) ` : "") + plainTitle;
   none.hidden = cameras.length > 0;
-  if (index.size) none.textContent = "No camera is like that.";
-  found.textContent = cameras.length === 1 ? "1 camera" : `${cameras.length} cameras`;
+  if (index.size) none.textContent = _("No camera is like that.");
+  found.textContent = _n("{n} camera", "{n} cameras", cameras.length);
   pager.hidden = cameras.length <= PAGE;
   const last = Math.min((page + 1) * PAGE, cameras.length);
-  document.getElementById("shown").textContent = `${page * PAGE + 1} to ${last} of ${cameras.length}`;
+  document.getElementById("shown").textContent = _("{first} to {last} of {all}", { first: page * PAGE + 1, last, all: cameras.length });
   document.getElementById("back").disabled = page === 0;
   document.getElementById("forth").disabled = last === cameras.length;
   if (!bulk) return;
@@ -195,7 +196,7 @@ async function look(events) {
 }
 
 function wordsOf(alert) {
-  if (!alert.camera_id) return alert.reason;
+  if (!alert.camera_id) return document.querySelector(`#banner-${CSS.escape(alert.id)} p`)?.textContent ?? "";
   const row = rows.get(alert.camera_id);
   if (!row) return "";
   return `${row.querySelector(".who a").textContent}: ${row.querySelector(".words").textContent}`;
@@ -210,7 +211,7 @@ listen(document.getElementById("banners"), {
   ...ALERT_ACTS,
   answer: (said, button) => answer({ ...said, name: button.closest(".banner").dataset.name }),
   async "take-over"({ handover }) {
-    await done("Taken over.", signed("POST", `/handovers/${handover}/take`));
+    await done(_("Taken over."), signed("POST", `/handovers/${handover}/take`));
     await fetchBanners();
   },
 });

@@ -1,5 +1,7 @@
 // What is wrong with the service, in the head of every page, and that a page is of before it stopped.
 
+import { _ } from "./words.js";
+
 const place = document.getElementById("health");
 const EVERY_MS = 30_000;
 const clock = new Intl.DateTimeFormat("sv-SE", { timeZone: document.body.dataset.zone, hour: "2-digit", minute: "2-digit" });
@@ -15,7 +17,7 @@ async function look() {
     const banner = document.createElement("div");
     banner.className = "banner critical";
     banner.role = "alert";
-    banner.textContent = `The service does not answer. What you see is as of ${clock.format(heard)}.`;
+    banner.textContent = _("The service does not answer. What you see is as of {time}.", { time: clock.format(heard) });
     place.replaceChildren(banner);
   }
 }

@@ -3,13 +3,14 @@
 import { announce, call, guarded, Refused } from "./act.js";
 import { refreshSoon } from "./camera.js";
 import { drags, drawMarks } from "./pointing.js";
+import { _, language } from "./words.js";
 
 const form = document.getElementById("hint");
 const list = document.getElementById("hint-list");
 const says = document.getElementById("hint-says");
 const camera = document.getElementById("camera").dataset.camera;
 const url = `/cameras/${encodeURIComponent(camera)}/hints`;
-const NAMES = { vertical: "Vertical", length: "Length", horizon: "Horizon", map_point: "Map point" };
+const NAMES = { vertical: _("Vertical"), length: _("Length"), horizon: _("Horizon"), map_point: _("Map point") };
 const LIES = 3; // standard deviations, from which on a mark is doubted
 const over = document.getElementById("over");
 const place = document.getElementById("over-marks");
@@ -51,14 +52,14 @@ const label = (n) => (kept[n].kind === "map_point" ? `${n + 1}` : "");
 function row(mark, number) {
   const item = document.createElement("li");
   const words = document.createElement("span");
-  const size = mark.length_m ? ` of ${mark.length_m} m` : "";
-  const lies = mark.off_sd > LIES ? ": it does not fit the others" : "";
+  const size = mark.length_m ? ` ${_("of {m} m", { m: mark.length_m.toLocaleString(language) })}` : "";
+  const lies = mark.off_sd > LIES ? `: ${_("it does not fit the others")}` : "";
   words.textContent = `${NAMES[mark.kind]} ${label(number)}`.trim() + size + lies;
   const button = document.createElement("button");
   button.type = "button";
   button.className = "slim";
-  button.textContent = "Take back";
-  button.setAttribute("aria-label", `Take back: ${words.textContent}`);
+  button.textContent = _("Take back");
+  button.setAttribute("aria-label", `${_("Take back")}: ${words.textContent}`);
   button.addEventListener("click", () => guarded(button, () => keep(kept.filter((_, at) => at !== number))));
   item.className = "row";
   item.append(words, button);
@@ -75,7 +76,7 @@ const bare = ({ off_sd: _, ...mark }) => Object.fromEntries(Object.entries(mark)
 
 async function keep(marks) {
   told(await call("PUT", url, marks.map(bare)));
-  announce(marks.length ? "The marks are kept." : "No mark is left.");
+  announce(marks.length ? _("The marks are kept.") : _("No mark is left."));
   refreshSoon();
 }
 

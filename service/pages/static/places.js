@@ -1,5 +1,7 @@
 // Sites and tags of the fleet as chips: one step into the site that is asked for, and all steps out.
 
+import { _ } from "./words.js";
+
 const MOST = 24; // of sites, and of tags; of more, the search finds the others
 
 /** True of a camera that lies at a site or below it and has all of some tags. */
@@ -25,7 +27,7 @@ export function showPlaces(box, cameras, wanted) {
   if (news === shown) return; // a chip that is being pressed stays
   shown = news;
   const out = steps.map((word, at) => chip("site", steps.slice(0, at + 1).join("/"), word));
-  if (steps.length) out.unshift(chip("site", "", "All sites"));
+  if (steps.length) out.unshift(chip("site", "", _("All sites")));
   out.at(-1)?.setAttribute("aria-pressed", "true");
   const chips = [
     ...out,
@@ -62,7 +64,7 @@ function chip(kind, value, words, [all, due] = []) {
   made.dataset[kind] = value;
   made.append(words);
   if (all) made.append(part("span", "soft", String(all)));
-  if (due) made.append(part("b", "due", String(due)), part("span", "hidden-words", due === 1 ? "needs a person" : "need a person"));
+  if (due) made.append(part("b", "due", String(due)), part("span", "hidden-words", due === 1 ? _("needs a person") : _("need a person")));
   return made;
 }
 

@@ -2,6 +2,7 @@
 
 import { Refused, announce, call, confirmed, guarded, sendFile } from "./act.js";
 import { drags, drawMarks, stepped } from "./pointing.js";
+import { _ } from "./words.js";
 
 const svg = document.getElementById("site-plan");
 const image = svg.querySelector("image");
@@ -97,7 +98,7 @@ async function choose() {
   try {
     await seen.decode();
   } catch {
-    says.textContent = "That is no JPEG and no PNG.";
+    says.textContent = _("That is no JPEG and no PNG.");
     return;
   }
   measured = { file: chosen, ruler: [] };
@@ -117,7 +118,7 @@ async function keep() {
     says.textContent = reason ? `${pointer.slice(1)}: ${reason}` : error.message;
     return; // what was measured stays
   }
-  announce("The plan is kept.");
+  announce(_("The plan is kept."));
   layPlan();
   svg.focus();
 }
@@ -138,8 +139,8 @@ form.addEventListener("submit", (event) => {
 });
 remove.addEventListener("click", () =>
   guarded(remove, async () => {
-    const detail = "Marks that were made by it stay.";
-    if (!(await confirmed({ title: "Delete the plan?", detail, yes: "Delete it" }))) return;
+    const detail = _("Marks that were made by it stay.");
+    if (!(await confirmed({ title: _("Delete the plan?"), detail, yes: _("Delete it") }))) return;
     await call("DELETE", url);
     plan = null;
     layPlan();

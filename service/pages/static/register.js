@@ -2,6 +2,7 @@
 
 import { announce, call, guarded, Refused, showProblem } from "./act.js";
 import { debounced } from "./events.js";
+import { _, _n } from "./words.js";
 
 const WAIT_MS = 250;
 const DRAFT = "surefoot-register";
@@ -36,7 +37,7 @@ function say({ kind, text, field, value }) {
   if (value) {
     const mend = document.createElement("button");
     mend.type = "button";
-    mend.textContent = `Make it ${value}`;
+    mend.textContent = _("Make it {value}", { value });
     mend.addEventListener("click", () => {
       const input = document.getElementById(field);
       input.value = value;
@@ -71,7 +72,7 @@ async function look() {
   if (answer.picture) {
     picture.innerHTML = answer.picture;
     const label = picture.firstElementChild.getAttribute("aria-label").split("; ")[1];
-    document.getElementById("squares").textContent = `ground, ${label}`;
+    document.getElementById("squares").textContent = `${_("ground")}, ${label}`;
     document.getElementById("caption").hidden = !picture.querySelector(".grid");
   }
   document.getElementById("ground").innerHTML = answer.ground;
@@ -143,7 +144,7 @@ async function register() {
     first.closest("details")?.setAttribute("open", "");
     first.focus();
     const count = Object.keys(refused).length;
-    announce(count === 1 ? "One field needs another look." : `${count} fields need another look.`);
+    announce(_n("{n} field needs another look.", "{n} fields need another look.", count));
   }
 }
 

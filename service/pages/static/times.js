@@ -1,5 +1,7 @@
 // "3 minutes ago", said anew as time goes on; the same words as service/wording/times.py.
 
+import { _, language } from "./words.js";
+
 const EVERY_MS = 10_000;
 const UNITS = [
   ["year", 31_536_000],
@@ -11,11 +13,11 @@ const UNITS = [
   ["second", 1],
 ];
 const AT_LEAST = 1.5; // of a unit, to say a length of time in it: "90 minutes", then "2 hours"
-const WORDS = new Intl.RelativeTimeFormat("en");
+const WORDS = new Intl.RelativeTimeFormat(language);
 
 export function ago(iso) {
   const seconds = (Date.parse(iso) - Date.now()) / 1000;
-  if (seconds > -10 && seconds <= 60) return "just now";
+  if (seconds > -10 && seconds <= 60) return _("just now");
   const [unit, size] = UNITS.find(([, size]) => Math.abs(seconds) >= AT_LEAST * size) ?? UNITS.at(-1);
   return WORDS.format(Math.round(seconds / size), unit);
 }

@@ -2,6 +2,7 @@
 
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
+import { _ } from "./words.js";
 import { zone } from "./zoned.js";
 
 const EVERY_MS = 10_000;
@@ -37,7 +38,8 @@ function say() {
   const seconds = Math.round((performance.now() - heard) / 1000);
   const stopped = !live || seconds > OLD_S;
   age.dataset.stopped = stopped;
-  age.textContent = `${stopped ? "Stopped: as" : "As"} of ${clock.format(Date.parse(wall.dataset.made))}, ${seconds} s ago`;
+  const at = { time: clock.format(Date.parse(wall.dataset.made)), seconds };
+  age.textContent = stopped ? _("Stopped: as of {time}, {seconds} s ago", at) : _("As of {time}, {seconds} s ago", at);
   document.getElementById("stopped").hidden = !stopped;
 }
 
@@ -56,7 +58,7 @@ sound.addEventListener("click", () => {
   audio?.close();
   audio = audio ? null : new AudioContext(); // a browser allows it after a click alone
   sound.setAttribute("aria-pressed", Boolean(audio));
-  sound.textContent = `Sound: ${audio ? "on" : "off"}`;
+  sound.textContent = audio ? _("Sound: on") : _("Sound: off");
   beep();
 });
 

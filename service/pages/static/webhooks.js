@@ -3,6 +3,7 @@
 import { call, confirmed } from "./act.js";
 import { listen } from "./alert_acts.js";
 import { showErrors } from "./dialogs.js";
+import { _ } from "./words.js";
 
 const root = document.getElementById("main");
 const path = (button) => `/webhooks/${button.closest("[data-id]").dataset.id}`;
@@ -27,15 +28,15 @@ listen(root, {
   replay: ({ delivery }) => then(call("POST", `/deliveries/${delivery}/replay`)),
 
   async secret(_, button) {
-    const detail = "For a day, messages are signed with the old one, too. Then it counts no more.";
-    if (await confirmed({ title: `A new secret for ${nameOf(button)}?`, detail, yes: "Make it" })) {
+    const detail = _("For a day, messages are signed with the old one, too. Then it counts no more.");
+    if (await confirmed({ title: _("A new secret for {name}?", { name: nameOf(button) }), detail, yes: _("Make it") })) {
       showSecret((await call("POST", `${path(button)}/secret`)).secret);
     }
   },
 
   async remove(_, button) {
-    const detail = "Nobody is told there any more, and what was sent is forgotten.";
-    if (await confirmed({ title: `Remove ${nameOf(button)}?`, detail, yes: "Remove it" })) {
+    const detail = _("Nobody is told there any more, and what was sent is forgotten.");
+    if (await confirmed({ title: _("Remove {name}?", { name: nameOf(button) }), detail, yes: _("Remove it") })) {
       await then(call("DELETE", path(button)));
     }
   },

@@ -3,6 +3,7 @@
 import { Refused, announce, call, confirmed, guarded } from "./act.js";
 import { refreshSoon } from "./camera.js";
 import { corners, drags, shape, stepped } from "./pointing.js";
+import { _ } from "./words.js";
 
 const box = document.querySelector(".picture-box");
 const form = document.getElementById("zoning");
@@ -54,7 +55,7 @@ function show() {
       shape(place, "circle", { class: "between", cx: (u + next[0]) / 2, cy: (v + next[1]) / 2, r: r * 0.7, "data-between": n });
   });
   points.forEach(([u, v], n) => {
-    const label = `Corner ${n + 1} of ${chosen.name}, at ${u} ${v}`;
+    const label = _("Corner {n} of {name}, at {u} {v}", { n: n + 1, name: chosen.name, u, v });
     const said = { tabindex: 0, role: "button", "aria-label": label };
     shape(place, "circle", { class: "corner", cx: u, cy: v, r, "data-corner": n, ...said });
   });
@@ -106,7 +107,7 @@ function press(at, target) {
 /** Add a corner by keyboard: beside the one before it, or halfway to the next. */
 function add(n) {
   const { points, line } = chosen;
-  if (line && points.length > 1) return announce("A line has two ends.");
+  if (line && points.length > 1) return announce(_("A line has two ends."));
   const from = points[n] ?? points.at(-1);
   if (!from) return insert(0, [width / 2, height / 2].map(Math.round));
   if (points.length > 2 && n >= 0) {
@@ -120,7 +121,7 @@ function add(n) {
 
 function takeAway(n) {
   if (chosen.points.length <= least(chosen) && !fresh)
-    return announce(`A ${chosen.line ? "line has two ends" : "zone has three corners or more"}: remove it as a whole.`);
+    return announce(chosen.line ? _("A line has two ends: remove it as a whole.") : _("A zone has three corners or more: remove it as a whole."));
   chosen.points.splice(n, 1);
   changed = true;
   show();
@@ -149,8 +150,9 @@ function begin(kind) {
   const [type, on] = KINDS[kind];
   const taken = new Set(drawing.zones.map((zone) => zone.name));
   let number = 1;
-  while (taken.has(`${kind} ${number}`)) number++;
-  const feature = { type: "Feature", id: `${kind} ${number}`, properties: { on }, geometry: { type, coordinates: [[]] } };
+  const called = { zone: _("zone"), line: _("line"), mask: _("mask") }[kind];
+  while (taken.has(`${called} ${number}`)) number++;
+  const feature = { type: "Feature", id: `${called} ${number}`, properties: { on }, geometry: { type, coordinates: [[]] } };
   drawing.zones.push({ feature, line: kind === "line", name: feature.id, points: [] });
   changed = true;
   choose(drawing.zones.at(-1), true);
@@ -171,7 +173,7 @@ async function enter({ dataset }) {
   const collection = await answer.json();
   drawing = { collection, etag: answer.headers.get("ETag"), zones: collection.features.map(zoneOf) };
   const lost = Number(dataset.zones) - drawing.zones.length;
-  says.textContent = lost > 0 ? `${lost} of the zones cannot be drawn where they are now, and would be gone once you save.` : "";
+  says.textContent = lost > 0 ? _("{n} of the zones cannot be drawn where they are now, and would be gone once you save.", { n: lost }) : "";
   changed = false;
   box.classList.add("zoning");
   form.hidden = false;
@@ -182,8 +184,8 @@ async function enter({ dataset }) {
 }
 
 async function leave() {
-  const detail = "What you have drawn is not kept.";
-  if (changed && !(await confirmed({ title: "Leave without saving?", detail, yes: "Leave" }))) return;
+  const detail = _("What you have drawn is not kept.");
+  if (changed && !(await confirmed({ title: _("Leave without saving?"), detail, yes: _("Leave") }))) return;
   drawing = chosen = null;
   changed = false;
   place.replaceChildren();
@@ -199,7 +201,7 @@ async function save() {
   const unfinished = drawing.zones.find((zone) => zone.points.length < least(zone));
   if (unfinished) {
     choose(unfinished, true);
-    says.textContent = `${unfinished.name} has too few corners: ${least(unfinished)} are needed.`;
+    says.textContent = _("{name} has too few corners: {n} are needed.", { name: unfinished.name, n: least(unfinished) });
     return;
   }
   for (const { feature, line, name: called, points } of drawing.zones) {
@@ -214,7 +216,7 @@ async function save() {
     says.textContent = error.problem.errors?.[0]?.reason ?? error.message;
     return; // what was drawn stays
   }
-  announce("The zones are kept, as drawn at the pose of now.");
+  announce(_("The zones are kept, as drawn at the pose of now."));
   changed = false;
   button().dataset.zones = drawing.zones.length; // until the page says so
   await leave();
