@@ -13,6 +13,7 @@ from service.errors import ForbiddenError, UnauthorizedError
 from service.settings import Settings
 from service.store import access
 from service.store.access import SessionRecord
+from service.wording.language import _
 
 _ID_BYTES = 32
 
@@ -26,9 +27,13 @@ def check_login(session: Session, token: str) -> Caller:
     """
     caller = caller_of_token(session, token.strip())
     if caller is None:
-        raise UnauthorizedError("token: nobody is let in with this; it may be over or revoked")
+        raise UnauthorizedError(
+            "token: " + _("nobody is let in with this; it may be over or revoked")
+        )
     if not caller.may(TokenScope.READ):
-        raise ForbiddenError("token: pages need the scope read, this is for posting tracks alone")
+        raise ForbiddenError(
+            "token: " + _("pages need the scope read, this is for posting tracks alone")
+        )
     return caller
 
 

@@ -14,6 +14,7 @@ from service.enums import Activity, TokenScope
 from service.errors import ForbiddenError, MalformedError, NotFoundError
 from service.store import access
 from service.store.access import Actor, TokenRecord
+from service.wording.language import _
 
 _PREFIX = "sf"
 _SECRET_BYTES = 32
@@ -136,8 +137,8 @@ def revoke_token(session: Session, token_id: str, by: str | None) -> TokenRecord
 
 def caller_of_token(session: Session, text: str) -> Caller | None:
     """The caller with a token; None where nobody is let in with it."""
-    prefix, _, rest = text.partition("_")
-    token_id, _, secret = rest.partition("_")
+    prefix, _sign, rest = text.partition("_")
+    token_id, _sign, secret = rest.partition("_")
     record = session.get(TokenRecord, token_id) if prefix == _PREFIX else None
     # The same work for a token that is unknown: its id is no secret, but need not be told.
     kept = _NO_SECRET if record is None else record.secret_sha256
@@ -178,17 +179,25 @@ def _check(spec: TokenSpec, now: datetime) -> None:
     unknown = [scope for scope in spec.scopes if scope not in list(TokenScope)]
     refuse = MalformedError.of_field
     if not 0 < len(spec.name.strip()) <= MAX_NAME:
-        raise refuse("name", f"1 to {MAX_NAME} characters are needed, got {len(spec.name.strip())}")
+        count = len(spec.name.strip())
+        raise refuse("name", _("1 to {n} characters are needed, got {got}", n=MAX_NAME, got=count))
     if not spec.name.isprintable():
-        raise refuse("name", "letters that can be printed, on one line, are needed")
+        raise refuse("name", _("letters that can be printed, on one line, are needed"))
     if unknown or not spec.scopes:
-        got = ", ".join(unknown) or "none"
-        raise refuse("scopes", f"some of {', '.join(TokenScope)} are needed, got {got:.80}")
+        got = ", ".join(unknown)[:80] or _("none")
+        scopes = ", ".join(TokenScope)
+        raise refuse("scopes", _("some of {scopes} are needed, got {got}", scopes=scopes, got=got))
     for field, named in (("cameras", spec.cameras), ("sources", spec.sources)):
         if named is not None and (TokenScope.INGEST not in spec.scopes or not named):
-            raise refuse(field, f"{field} are named for the scope ingest alone, one at least")
+            raise refuse(
+                field, _("{field} are named for the scope ingest alone, one at least", field=field)
+            )
     for name in spec.sources or ():
         if not 0 < len(name) <= MAX_NAME or not name.isprintable():
-            raise refuse("sources", f"1 to {MAX_NAME} printable characters each, got {name!r:.80}")
+            got = f"{name!r:.80}"
+            raise refuse(
+                "sources", _("1 to {n} printable characters each, got {got}", n=MAX_NAME, got=got)
+            )
     if spec.expires_at is not None and spec.expires_at <= now:
-        raise refuse("expires_at", f"a time after now is needed, got {spec.expires_at.isoformat()}")
+        got = spec.expires_at.isoformat()
+        raise refuse("expires_at", _("a time after now is needed, got {got}", got=got))

@@ -39,6 +39,7 @@ from service.errors import (
 )
 from service.settings import Settings
 from service.store.access import name_in, set_actor
+from service.wording.language import _
 
 _MOST_BYTES = 16 * 1024
 _MOST_FIELDS = 100
@@ -215,7 +216,8 @@ def _spec(form: Form) -> TokenSpec:
     expires_at = None
     if days:
         if not days.isascii() or not days.isdigit() or not 0 < int(days) <= _MOST_DAYS:
-            reason = f"a number of days from 1 to {_MOST_DAYS} is needed, got {days!r:.20}"
+            got = f"{days!r:.20}"
+            reason = _("a number of days from 1 to {n} is needed, got {got}", n=_MOST_DAYS, got=got)
             raise MalformedError.of_field("expires_at", reason)
         expires_at = datetime.now(UTC) + timedelta(days=int(days))
     return TokenSpec(

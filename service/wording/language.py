@@ -3,7 +3,7 @@
 Texts stand in English in the code, in `_`; a catalogue has them in other languages.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
@@ -56,12 +56,13 @@ def ngettext(one: str, many: str, n: int) -> str:
 
 def _(text: str, /, **values: Any) -> str:
     """A text in the language, with values in their places."""
-    return _FORMATS[spoken()].format(gettext(text), **values) if values else gettext(text)
+    said = gettext(text)
+    return _FORMATS[spoken()](said, **values) if values else said
 
 
 def _n(one: str, many: str, n: int, /, **values: Any) -> str:
     """A text of one or of many in the language, with `n` and other values in their places."""
-    return _FORMATS[spoken()].format(ngettext(one, many, n), n=n, **values)
+    return _FORMATS[spoken()](ngettext(one, many, n), n=n, **values)
 
 
 def inner(text: str) -> str:
@@ -71,8 +72,7 @@ def inner(text: str) -> str:
 
 def number(value: float, spec: str) -> str:
     """A number as `format` has it, with the language's decimal sign."""
-    said: str = _FORMATS[spoken()].format_field(value, spec)
-    return said
+    return _FORMATS[spoken()](f"{{:{spec}}}", value)
 
 
 def script_words() -> dict[str, str]:
@@ -88,7 +88,7 @@ class _CommaFormatter(Formatter):
         return text.translate(_POINTS_AND_COMMAS) if isinstance(value, int | float) else text
 
 
-_FORMATS = {ENGLISH: Formatter(), "de": _CommaFormatter()}
+_FORMATS: dict[str, Callable[..., str]] = {ENGLISH: str.format, "de": _CommaFormatter().format}
 
 
 @cache

@@ -35,6 +35,7 @@ from service.settings import Settings
 from service.store import access
 from service.store.access import set_actor
 from service.store.engines.store import Store
+from service.wording.language import _
 
 log = logging.getLogger("surefoot.access")
 
@@ -173,7 +174,7 @@ def refuse(request: Request) -> None:
             log.warning("refusal_not_kept", extra={"error": str(error)})
     if failure.wait_s:
         raise TooManyRequestsError(
-            "token: too many were refused from this address", retry_after_s=failure.wait_s
+            "token: " + _("too many were refused from this address"), retry_after_s=failure.wait_s
         )
 
 
@@ -206,7 +207,7 @@ def _finder(request: Request, settings: Settings) -> Callable[[Store], Caller | 
         with store.read() as session:
             if given is None:
                 return sessions.caller_of_session(session, cookie or "")
-            scheme, _, token = given.partition(" ")
+            scheme, _blank, token = given.partition(" ")
             if scheme.lower() != "bearer":
                 return None
             return tokens.caller_of_token(session, token.strip())

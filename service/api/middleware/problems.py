@@ -39,6 +39,12 @@ _FOR_PEOPLE = {
         "You may look, but not do this. Whoever looks after the service can give you the right."
     )
 }
+_TITLES = {
+    403: N_("Forbidden"),
+    404: N_("Not found"),
+    500: N_("The service failed"),
+    503: N_("The service is busy"),
+}  # of pages
 _MOST_ERRORS = 20  # of one body
 _BRIEF = reprlib.Repr()
 _BRIEF.maxstring = 80
@@ -87,6 +93,7 @@ def problem(request: Request, error: ServiceError) -> Response:
         headers["Retry-After"] = str(max(1, round(error.retry_after_s)))
     if pages.wants_page(request):
         said = _(_FOR_PEOPLE[status]) if status in _FOR_PEOPLE else error.detail
+        title = _(_TITLES.get(status, title))
         page = pages.render(request, "problem.html", status, title=title, detail=said)
         page.headers.update(headers)
         return page

@@ -5,9 +5,11 @@ from datetime import UTC, datetime, timedelta
 from io import BytesIO
 
 import pytest
+from fastapi.testclient import TestClient
 from PIL import Image
 
 from service.api.middleware.scopes import NEEDS
+from service.app import create_app
 from service.store import workers
 from service.wording import language
 from tests.conftest import CAMERA, track
@@ -171,6 +173,22 @@ def test_no_word_of_a_page_is_left_unmarked(everything, bracketing):
             assert path in ("/ui/login",) or answer.status_code == 200, url
             looked += "⟦" in answer.text
     assert looked > 20
+    missing = everything.get("/ui/cameras/nowhere", headers={**GERMAN, "Accept": "text/html"})
+    assert missing.status_code == 404
+    assert outside_brackets(missing.text, DATA) == []
+    wrong = everything.post("/ui/tokens", data={"name": "", "days": "0"}, headers=GERMAN)
+    assert wrong.status_code == 422
+    assert outside_brackets(wrong.text, DATA) == []
+
+
+def test_a_login_is_refused_in_german(settings):
+    closed = settings.model_copy(update={"auth": "on"})
+    with TestClient(create_app(closed)) as http:
+        page = http.get("/ui/login", headers=GERMAN).text
+        assert "Bei surefoot anmelden" in page
+        refused = http.post("/ui/login", data={"token": "sf_a_b"}, headers=GERMAN)
+    assert refused.status_code == 401
+    assert "damit wird niemand eingelassen" in refused.text
 
 
 def test_an_unmarked_word_is_found():
