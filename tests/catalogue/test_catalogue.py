@@ -113,3 +113,6 @@ def test_where_texts_are_said_nothing_else_is_called_so():
         targets += [n.target for n in nodes if isinstance(n, ast.For)]
         taken = {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
         assert not {"_"} & names & taken, path
+    for path in (ROOT / "service" / "pages" / "static").glob("*.js"):
+        lines = [line for line in path.read_text().splitlines() if not line.startswith("import")]
+        assert not re.findall(r"[(,{] ?_ ?[,)}].*|: _ ?[,}].*", "\n".join(lines)), path

@@ -60,7 +60,7 @@ function row(mark, number) {
   button.className = "slim";
   button.textContent = _("Take back");
   button.setAttribute("aria-label", `${_("Take back")}: ${words.textContent}`);
-  button.addEventListener("click", () => guarded(button, () => keep(kept.filter((_, at) => at !== number))));
+  button.addEventListener("click", () => guarded(button, () => keep(kept.filter((mark, at) => at !== number))));
   item.className = "row";
   item.append(words, button);
   return item;
@@ -72,7 +72,7 @@ function told(answer) {
   show();
 }
 
-const bare = ({ off_sd: _, ...mark }) => Object.fromEntries(Object.entries(mark).filter(([, value]) => value !== null));
+const bare = ({ off_sd, ...mark }) => Object.fromEntries(Object.entries(mark).filter(([, value]) => value !== null));
 
 async function keep(marks) {
   told(await call("PUT", url, marks.map(bare)));

@@ -22,19 +22,19 @@ async function then(what) {
 }
 
 listen(root, {
-  test: (_, button) => then(call("POST", `${path(button)}/test`)),
-  off: (_, button) => then(call("PATCH", path(button), { enabled: false })),
-  on: (_, button) => then(call("PATCH", path(button), { enabled: true })),
+  test: (said, button) => then(call("POST", `${path(button)}/test`)),
+  off: (said, button) => then(call("PATCH", path(button), { enabled: false })),
+  on: (said, button) => then(call("PATCH", path(button), { enabled: true })),
   replay: ({ delivery }) => then(call("POST", `/deliveries/${delivery}/replay`)),
 
-  async secret(_, button) {
+  async secret(said, button) {
     const detail = _("For a day, messages are signed with the old one, too. Then it counts no more.");
     if (await confirmed({ title: _("A new secret for {name}?", { name: nameOf(button) }), detail, yes: _("Make it") })) {
       showSecret((await call("POST", `${path(button)}/secret`)).secret);
     }
   },
 
-  async remove(_, button) {
+  async remove(said, button) {
     const detail = _("Nobody is told there any more, and what was sent is forgotten.");
     if (await confirmed({ title: _("Remove {name}?", { name: nameOf(button) }), detail, yes: _("Remove it") })) {
       await then(call("DELETE", path(button)));
