@@ -8,6 +8,10 @@ from tests.browser.conftest import axe, shoot, too_wide
 from tests.service.fleet_bench import Fleet
 
 pytestmark = pytest.mark.slow
+PAGES = (
+    *("report", "handover", "map", "health", "glossary", "settings"),
+    *("register", "tokens", "webhooks"),
+)
 
 
 @pytest.fixture
@@ -72,7 +76,7 @@ def test_an_operator_reads_german_and_may_read_english(page, server):
     expect(page.locator(".undo")).to_have_text(
         re.compile(r"Eigene Antwort, gerade eben: neue Ausrichtung behalten\. Rückgängig")
     )
-    for name in ("report", "map", "health", "glossary", "register", "tokens", "webhooks"):
+    for name in PAGES:
         page.goto(f"/ui/{name}")
         looked_at(page, name)
     page.goto("/ui/cameras/neu")
