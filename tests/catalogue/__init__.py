@@ -2,6 +2,7 @@
 
 import io
 import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +18,7 @@ FILES = {
     for language in LANGUAGES
     if language != ENGLISH
 }
+_EXTRACT = "extract -F pyproject.toml -k N_ -k _n:1,2 --add-location=file"
 # Lines of a catalogue's head.
 _OF_A_DAY = tuple(
     f'"{name}'.encode()
@@ -29,14 +31,14 @@ def extracted() -> Catalog:
     """The texts as they stand in the code, by `[tool.babel]` of pyproject.toml."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "surefoot.pot"
-        command = "pybabel -q extract -F pyproject.toml -k N_ -k _n:1,2 --add-location=file"
-        subprocess.run([*command.split(), "-o", path, "service"], cwd=ROOT, check=True)
-        return read_po(path.open("rb"))
+        pybabel = [sys.executable, "-m", "babel.messages.frontend", "-q"]
+        subprocess.run([*pybabel, *_EXTRACT.split(), "-o", path, "service"], cwd=ROOT, check=True)
+        return read_po(io.BytesIO(path.read_bytes()))
 
 
 def kept(language: str) -> Catalog:
     """The catalogue of a language."""
-    return read_po(FILES[language].open("rb"), language)
+    return read_po(io.BytesIO(FILES[language].read_bytes()), language)
 
 
 def renewed(language: str) -> bytes:
