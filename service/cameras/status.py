@@ -61,11 +61,18 @@ class CameraStatus:
 
 
 def camera_statuses(
-    session: Session, settings: Settings, ids: Collection[str] | None = None
+    session: Session,
+    settings: Settings,
+    ids: Collection[str] | None = None,
+    *,
+    lean: bool = False,
 ) -> dict[str, CameraStatus]:
-    """The status of all cameras, or some, in order of their ids, by a handful of statements."""
+    """The status of all cameras, or some, in order of their ids, by a handful of statements.
+
+    With `lean`, references and estimates have no more than what their states are told by.
+    """
     now = datetime.now(UTC)
-    newest = fleet.newest(session, ids)
+    newest = fleet.newest(session, ids, lean=lean)
     windows: dict[str, list[MaintenanceRecord]] = {}
     if any(each.attended for each in newest.values()):
         windows = fleet.maintenance_windows(session, ids)

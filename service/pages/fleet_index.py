@@ -106,7 +106,7 @@ def fleet_index(session: Session, settings: Settings) -> list[Entry]:
     """All cameras, those first that need a person."""
     now = datetime.now(UTC)
     labels = fleet.labels(session, None)
-    statuses = camera_statuses(session, settings)
+    statuses = camera_statuses(session, settings, lean=True)
     entries = [entry_of(each, labels[i], now) for i, each in statuses.items() if i in labels]
     return sorted(entries, key=lambda entry: entry.order)
 

@@ -194,7 +194,7 @@ def _by_state(
 ) -> dict[PoseState, list[ReportedCamera]]:
     """Cameras by their states, of which one that has moved and is silent, too, has the latter."""
     cameras: dict[PoseState, list[ReportedCamera]] = defaultdict(list)
-    for each in camera_statuses(session, settings).values():
+    for each in camera_statuses(session, settings, lean=True).values():
         state, since = each.state, each.since
         if each.silent and each.last_track_s is not None:
             state, since = PoseState.NO_DATA, from_seconds(each.last_track_s)
