@@ -2,6 +2,7 @@
 
 import pytest
 
+from service.store import references
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.service.fleet_bench import Fleet
 
@@ -150,3 +151,53 @@ def test_what_has_ended_offers_no_choice_of_all(page, server):
     page.goto("/ui/alerts?state=resolved")
     assert page.locator(".alert-row").count() == 1
     assert page.get_by_label("All that are shown").count() == 0
+
+
+def test_a_trackers_group_is_answered_once_for_all_and_undone(page, server):
+    """It wore a clock's words, and each of its members had buttons of its own."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    fleet = Fleet(server.settings)
+    for n in range(3):
+        fleet.add(f"c{n}", f"Corner {n}", tilt_deg=3.0)
+    with fleet.store.write() as session:
+        for n in range(3):
+            references.newest(session, f"c{n}").source = "nvr-east"
+    for n in range(3):
+        fleet.knock(f"c{n}")
+    fleet.close()
+    page.goto("/")
+    page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
+    banner = page.get_by_role("group", name="Alert about a tracker")
+    expect(banner.get_by_role("button")).to_have_text(
+        ["It was put right", "False alarm", "Acknowledge", "Silence…"]
+    )
+    page.get_by_label("Choose all that are found").check()
+    expect(page.locator("#mixed")).to_have_text("3 of 3 are answered with their tracker.")
+    expect(page.locator("#bulk").get_by_role("button", name="They were put back")).to_be_hidden()
+    shoot(page, "group-fleet")
+    page.get_by_role("link", name="Corner 1").first.click()
+    apart = page.get_by_text("This camera apart")
+    expect(page.get_by_role("button", name="It was put back")).to_be_hidden()
+    apart.click()
+    expect(page.get_by_role("button", name="It was put back")).to_be_visible()
+    assert axe(page) == []
+    shoot(page, "group-member")
+    page.set_viewport_size({"width": 390, "height": 844})
+    shoot(page, "group-member-phone")
+    page.get_by_role("link", name="Cameras of a tracker moved together").click()
+    rows = page.locator(".alert-row")
+    expect(rows).to_have_count(1)
+    expect(rows).to_contain_text("Many moved")
+    shoot(page, "group-alert-phone")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.goto("/ui/alerts")
+    expect(rows).to_have_count(4)
+    assert axe(page) == []
+    shoot(page, "group-alerts")
+    page.get_by_role("button", name="It was put right").click()
+    undo = page.locator("#undo")
+    expect(undo).to_contain_text("Put right: 3 cameras of nvr-east.")
+    expect(rows).to_have_count(0)
+    undo.get_by_role("button", name="Undo").click()
+    expect(page.locator("#announce")).to_have_text("Undone: 3 cameras.")
+    expect(rows).to_have_count(3)  # each by itself now: the group has ended

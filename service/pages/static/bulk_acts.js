@@ -15,7 +15,7 @@ const ANSWERED = { status: 409, detail: "state: only a firing alert takes this" 
 
 // --- What is offered -----------------------------------------------------------------------------
 
-/** Offer what all of some items take, each of some `kinds`; says in words what some do not. */
+/** Offer what all of some items take, each of some `kinds`; says in words why it is no more. */
 export function offer(bulk, items, noun) {
   bulk.hidden = !items.length;
   document.getElementById("chosen").textContent = counted(items.length, noun);
@@ -25,21 +25,26 @@ export function offer(bulk, items, noun) {
     button.hidden = able < items.length;
     lost ||= able > 0 && button.hidden;
   }
-  document.getElementById("mixed").textContent = lost ? mixture(items) : "";
+  const answers = bulk.querySelector('[data-bulk="resolve"]:not([hidden])');
+  document.getElementById("mixed").textContent = lost || !answers ? mixture(items, lost) : "";
 }
 
 const takes = (kinds, act) => kinds.split(" ").some((kind) => RULE.kinds[kind].takes.includes(act));
 
-/** "2 of 5 are clock faults: choose them apart." All but the most of a kind are named. */
-function mixture(items) {
+/**
+ * "2 of 5 are clock faults: choose them apart." All but the most of a kind are named; where none of
+ * them can be answered, all: "3 of 3 are answered with their tracker."
+ */
+function mixture(items, lost) {
   const counts = new Map();
   for (const { kinds } of items) counts.set(kinds, (counts.get(kinds) ?? 0) + 1);
-  const [, ...fewer] = [...counts].sort(([, a], [, b]) => b - a);
+  const fewer = [...counts].sort(([, a], [, b]) => b - a).slice(lost ? 1 : 0);
   const parts = fewer.map(([kinds, count], at) => {
     const words = kinds.split(" ").map((kind) => RULE.kinds[kind].words[count === 1 ? 0 : 1]);
     const said = { n: count, all: items.length, are: words.join(_(" and ")) };
     return at ? _("{n} {are}", said) : _("{n} of {all} {are}", said);
   });
+  if (!lost) return items.length ? `${parts.join(", ")}.` : "";
   const [one] = fewer.length === 1 ? fewer[0].slice(1) : [0];
   return _n("{some}: choose it apart.", "{some}: choose them apart.", one, { some: parts.join(", ") });
 }
