@@ -65,17 +65,22 @@ def test_alerts_are_chosen_by_kind_severity_and_time_and_paged(knocked):
 def test_many_are_answered_at_once_each_for_itself(knocked):
     ids = [alert["id"] for alert in firing(knocked)]
     body = {"ids": [*ids, "nobody"], "act": "resolve", "outcome": "put_back", "by": "Ada"}
-    items = knocked.post("/acts", json=body).json()["items"]
+    told = knocked.post("/acts", json=body).json()
+    items, undo = told["items"], told["undo"]
     assert [item["id"] for item in items] == [*ids, "nobody"]
     refused = [item["problem"]["status"] for item in items if item["problem"]]
     assert sorted(refused) == [404, 422, 422]  # two clocks, which nobody puts back
+    assert sorted(undo["ids"]) == [f"c{n:02}" for n in range(12)]  # and not the clocks'
+    left_s = (datetime.fromisoformat(undo["until"]) - datetime.now(UTC)).total_seconds()
+    assert 800 < left_s < 900
     left = firing(knocked)
     assert {alert["kind"] for alert in left} == {"clock"}
     until = (datetime.now(UTC) + timedelta(hours=2)).isoformat()
     two = [alert["id"] for alert in left]
     for more in ({"act": "acknowledge", "by": "Ada"}, {"act": "silence", "until": until}):
-        done = knocked.post("/acts", json={"ids": two, **more}).json()["items"]
-        assert [item["problem"] for item in done] == [None, None]
+        done = knocked.post("/acts", json={"ids": two, **more}).json()
+        assert [item["problem"] for item in done["items"]] == [None, None]
+        assert done["undo"] is None
     assert all(alert["silenced"] and alert["acknowledged"] for alert in firing(knocked))
     body = {"ids": ["c00", "c01"], "act": "maintenance", "to": until}
     assert [i["problem"] for i in knocked.post("/acts", json=body).json()["items"]] == [None] * 2
