@@ -30,6 +30,7 @@ class Table(StrEnum):
     REPLAYS = "replays"
     FEW = "few"
     FAR = "far"
+    NAMES = "names"
 
 
 ALONE = ("tilt-alone", "roll-alone", "height-alone", "pan-alone")
@@ -38,10 +39,12 @@ _KNOCKS = {
     Table.PEOPLE: ("still", "pan", "knock", "pan-alone"),
     Table.FAULTS: ("still", "pan"),
     Table.FEW: ("still", "tilt-alone", "pan-alone", "pan"),
+    Table.NAMES: ("still",),
 }
 FEW = (8, 15, 20, 40)  # tracks
 FAR_DEG = (12, 20, 30, 45, 60, 90, 120, 150, 180)  # pans, both ways
 MOVES = ("still", "pan-2", "pan")
+LATER = tuple(name for name, fault in FAULTS.items() if fault.later)
 _LONG = 1500  # tracks; of longer recordings parts are taken
 _SIZES = ((200, 100), (1000, 400))
 _WINDOW = 400
@@ -156,10 +159,10 @@ def _case_ids(
     sizes: Sequence[tuple[int | None, int]] = _SIZES if long else ((None, _WINDOW),)
     if table == Table.FEW:
         sizes = [(_SIZES[0][0] if long else None, few) for few in FEW]
-    names = [""] if table != Table.FAULTS else ["", *faults]
+    injected = {Table.FAULTS: ("", *faults), Table.NAMES: LATER}.get(table, ())
     for seed in seeds:
-        for reference, seen in sizes if table != Table.FAULTS else sizes[-1:]:
-            for fault in names:
+        for reference, seen in sizes[-1:] if injected else sizes:
+            for fault in injected or ("",):
                 # Of halves in time nothing is drawn but the knock and the fault.
                 drawn = table == Table.PEOPLE or long or bool(fault) or seed == seeds[0]
                 yield tuple(
