@@ -160,7 +160,7 @@ def pose_posterior(
     marginals = noise + moves[:, seen][:, :, seen]
     gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
     squared = np.einsum("i,kij,j->k", offset[seen], np.linalg.inv(marginals), offset[seen])
-    squared[0] = _at_prior(float(squared[0]), fused.prior_gap)
+    squared[0] = _at_prior(float(squared[0]), fused.prior_gap, walking_groups)
     log_weights = log_prior(moved_prior) + log_student(squared, marginals, degrees)
     means = gains @ offset[seen]
     # The variance of a t: of few groups it is wider than that of a normal distribution.
@@ -252,7 +252,7 @@ def log_prior(moved_prior: float) -> Array:
     return np.asarray(np.log(weights))
 
 
-def _at_prior(squared: float, prior_gap: float) -> float:
+def _at_prior(squared: float, prior_gap: float, walking_groups: int) -> float:
     """The squared distance of a standing camera: by a Gaussian, or by people themselves.
 
     The covariance is of a Gaussian around the best pose, and the prior pose may be outside of what
@@ -262,7 +262,8 @@ def _at_prior(squared: float, prior_gap: float) -> float:
     if not math.isfinite(prior_gap):
         return squared
     gap = max(prior_gap, 0.0)
-    return min(max(squared, gap / config.OTHER_HOURS), gap)
+    by_hour = config.OTHER_HOURS + config.OTHER_HOURS_OF_A_GROUP * walking_groups
+    return min(max(squared, gap / by_hour), gap)
 
 
 def log_student(squared: Array, scales: Array, degrees: float) -> Array:

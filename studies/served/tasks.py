@@ -39,7 +39,6 @@ _KNOCKS = {
     Table.PEOPLE: ("still", "pan", "knock", "pan-alone"),
     Table.FAULTS: ("still", "pan"),
     Table.FEW: ("still", "tilt-alone", "pan-alone", "pan"),
-    Table.NAMES: ("still",),
 }
 FEW = (8, 15, 20, 40)  # tracks
 FAR_DEG = (12, 20, 30, 45, 60, 90, 120, 150, 180)  # pans, both ways
@@ -156,13 +155,16 @@ def _case_ids(
     if table == Table.FAR:
         yield from _far_ids(scene, long, seeds, batch)
         return
+    if table == Table.NAMES:
+        yield from _name_ids(scene, long, seeds, batch)
+        return
     sizes: Sequence[tuple[int | None, int]] = _SIZES if long else ((None, _WINDOW),)
     if table == Table.FEW:
         sizes = [(_SIZES[0][0] if long else None, few) for few in FEW]
-    injected = {Table.FAULTS: ("", *faults), Table.NAMES: LATER}.get(table, ())
+    names = [""] if table != Table.FAULTS else ["", *faults]
     for seed in seeds:
-        for reference, seen in sizes[-1:] if injected else sizes:
-            for fault in injected or ("",):
+        for reference, seen in sizes if table != Table.FAULTS else sizes[-1:]:
+            for fault in names:
                 # Of halves in time nothing is drawn but the knock and the fault.
                 drawn = table == Table.PEOPLE or long or bool(fault) or seed == seeds[0]
                 yield tuple(
@@ -194,6 +196,26 @@ def _far_ids(
                 for size in FAR_DEG
                 for turn in ((size, -size) if size < 180 else (size,))
             )
+
+
+def _name_ids(
+    scene: str, long: bool, seeds: Sequence[int], batch: int
+) -> Iterator[tuple[CaseId, ...]]:
+    """What sets in after the reference, before a camera that stands."""
+    for seed in seeds:
+        yield tuple(
+            CaseId(
+                table=Table.NAMES,
+                scene=scene,
+                seed=seed,
+                knock="still",
+                batch=batch,
+                fault=fault,
+                reference=_SIZES[-1][0] if long else None,
+                seen=_WINDOW,
+            )
+            for fault in LATER
+        )
 
 
 def _served(

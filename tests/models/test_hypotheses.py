@@ -109,13 +109,13 @@ def test_who_fits_far_worse_at_the_prior_pose_is_not_before_a_camera_that_stands
     alone = pose_posterior(estimate(heading=12, sd=wide), 40, PRIOR)
     assert alone.moved < 0.9
     beside = pose_posterior(estimate(heading=12, sd=wide, prior_gap=40.0), 40, PRIOR)
-    # Half of 40 is by what hours differ in. Of the Gaussian it was (12 / 6.4)^2 = 3.52; a t of 14
-    # degrees of freedom and four numbers: standing is (1 + 20 / 14)^-9 / (1 + 3.52 / 14)^-9 of it.
-    less = ((1 + 20 / 14) / (1 + (12 / 6.4) ** 2 / 14)) ** -9
+    # Hours differ by 1.5 + 40 * 0.03 = 2.7 times chance. A Gaussian makes it (12 / 6.4)^2 = 3.52;
+    # by a t of 14 degrees of freedom and four numbers standing is so much less likely.
+    less = ((1 + 40 / 2.7 / 14) / (1 + (12 / 6.4) ** 2 / 14)) ** -9
     stands = less * (1 - alone.moved)
     assert beside.moved == pytest.approx(alone.moved / (alone.moved + stands))
     # What the Gaussian says is enough where people lose as little as those of another hour.
-    hourly = pose_posterior(estimate(heading=12, sd=wide, prior_gap=7.0), 40, PRIOR)
+    hourly = pose_posterior(estimate(heading=12, sd=wide, prior_gap=9.0), 40, PRIOR)
     assert hourly.moved == pytest.approx(alone.moved)
 
 
