@@ -155,7 +155,7 @@ def pose_posterior(
     offset = fused.values - array_of(prior)
     offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
     noise = fused.covariance[np.ix_(seen, seen)]
-    degrees = _degrees(walking_groups)
+    degrees = degrees_of_freedom(walking_groups)
     moves = move_covariances()
     marginals = noise + moves[:, seen][:, :, seen]
     gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
@@ -217,7 +217,7 @@ def off_sd_at_odds(
     """
     priors = log_prior(moved_prior)[: len(_SUBSETS)]
     alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])
-    degrees, size = _degrees(walking_groups), int(seen.sum())
+    degrees, size = degrees_of_freedom(walking_groups), int(seen.sum())
     wider = 1 + config.MOVE_SD[seen, None] ** 2 / variances
     # With x the squared offset by its degrees of freedom, the two t's are to each other as
     # (1 + x) to (1 + x / wider): `ratio`, by the odds that are wanted.
@@ -234,7 +234,7 @@ def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
     return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, posterior.move)
 
 
-def _degrees(walking_groups: float | Array) -> Any:
+def degrees_of_freedom(walking_groups: float | Array) -> Any:
     """Degrees of freedom of an estimate: few groups tell less surely what their covariance is."""
     return config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
 

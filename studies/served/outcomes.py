@@ -78,8 +78,10 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
     if last is None or failure:
         return _unserved(case, failure, time.monotonic() - started)
     found, served = last.finding, last.finding.pose
-    verdict = judge(found.drift, DriftLimits(), ())
-    clock = clock_fault(found.drift, found.posterior.turned, case.prior_pose, None)
+    limits = DriftLimits()
+    wrong = None if found.clock is None else found.clock.reason(limits.certainty, None)
+    verdict = judge(found.drift, limits, (), clock=wrong is not None)
+    clock = wrong or clock_fault(found.drift, found.posterior.turned, case.prior_pose, None)
     return ServedOutcome(
         reference_tracks=len(case.reference),
         seen_tracks=len(case.seen),
