@@ -262,26 +262,32 @@ def _name(outcome: ServedOutcome) -> str:
 
 
 def _reliability_table(cases: _Cases) -> str:
-    """How many had moved, by how likely that was said to be; shares as if 2 of 10 had moved."""
-    lines = _head("moved", "cases that had", "cases that had not", "share, weighed", "said")
+    """How many had moved, by how likely that was said to be; shares as if 2 of 10 had moved.
+
+    Where few that had not were to be expected, none of them says little.
+    """
+    lines = _head(
+        "moved", "cases that had", "had not", "would not, as said", "share, weighed", "said"
+    )
     said = np.array([o.moved for _, o in cases], dtype=np.float64)
     moved = np.array([a.knock != "still" for a, _ in cases])
-    weights = np.where(
-        moved, MOVED_PRIOR / max(moved.sum(), 1), (1 - MOVED_PRIOR) / max((~moved).sum(), 1)
-    )
+    still_weight = (1 - MOVED_PRIOR) / max((~moved).sum(), 1)
+    weights = np.where(moved, MOVED_PRIOR / max(moved.sum(), 1), still_weight)
     for tenth in range(10):
         own = np.minimum((10 * said).astype(int), 9) == tenth
         if own.any():
             whole = weights[own].sum()
             share = f"{(weights * moved)[own].sum() / whole:.2f}"
-            mean = f"{(weights * said)[own].sum() / whole:.2f}"
+            mean = (weights * said)[own].sum() / whole
+            stills = (weights * moved)[own].sum() * (1 - mean) / mean / still_weight
             lines.append(
                 _row(
                     f"{tenth / 10:.1f} to {(tenth + 1) / 10:.1f}",
                     int((own & moved).sum()),
                     int((own & ~moved).sum()),
+                    f"{stills:.1f}",
                     share,
-                    mean,
+                    f"{mean:.2f}",
                 )
             )
     return "**Reliability** of `moved`, by the pose alone:\n\n" + "\n".join(lines)

@@ -131,7 +131,9 @@ def test_few_tracks_far_pans_and_how_reliable_moved_was(tmp_path):
     assert "| ±45 | 2 | 0 | 0 | 0 | 1 | 1 | 0.2 (0.2, 0) |" in said
     # Three had moved, one had not: 0.2 of the weight is the three's.
     mean = (0.2 * (0.95 + 0.93 + 0.95) / 3) + 0.8 * 0.91
-    assert f"| 0.9 to 1.0 | 3 | 1 | 0.20 | {mean:.2f} |" in said
+    # That many would not have: of 0.2 that had, as the mean has it, each of 0.8.
+    would = 0.2 * (1 - mean) / mean / 0.8
+    assert f"| 0.9 to 1.0 | 3 | 1 | {would:.1f} | 0.20 | {mean:.2f} |" in said
 
 
 def test_names_are_counted_beside_the_right_ones(tmp_path):
