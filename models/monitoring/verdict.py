@@ -144,6 +144,7 @@ def judge(
     creep: Creep | None = None,
     *,
     enough: bool = True,
+    clock: bool = False,
 ) -> DriftVerdict:
     """The verdict on a window, given what had drifted before.
 
@@ -155,9 +156,11 @@ def judge(
     calm. Where nothing is identifiable, nothing changes.
 
     Of fewer than `enough` people since somebody said how the camera stands, the pose neither begins
-    nor ends a drift.
+    nor ends a drift. A `clock` that is wrong before a camera that stands is one in height.
     """
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
+    if not crept and clock and enough:
+        crept = ("height",)
     beyond = _beyond(drift, limits) if enough else {}
     if not drift.identifiable and chart is None and not crept and not beyond:
         return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
@@ -307,6 +310,11 @@ def clock_fault(
     changed = drift.move.moved >= LIKELY and drift.move.parameters["height"] >= LIKELY
     if not changed or turned > config.CLOCK_TURNED:
         return None
+    return reason_of_scale(factor, frame_rate_hz)
+
+
+def reason_of_scale(factor: float, frame_rate_hz: float | None) -> Reason | None:
+    """Reason of times that are too long by a factor; None where it is a habit of the hour."""
     if abs(math.log(factor)) <= config.CLOCK_LEAST_LOG:
         return None
     values = {"factor": factor, "rate_hz": frame_rate_hz or config.USUAL_RATE_HZ}

@@ -25,6 +25,7 @@ from models.pose.alarms import (
     since_alarm,
     without_creep,
 )
+from models.pose.clock import WrongClock
 from models.pose.config import FEWEST_BESIDE
 from models.pose.estimating import (
     PartialFailure,
@@ -88,6 +89,7 @@ __all__ = [
     "WalkConfig",
     "Walks",
     "WarmStart",
+    "WrongClock",
     "assume_site",
     "begin_creep_log",
     "count_walks",

@@ -16,6 +16,7 @@ from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
 from models.pose import config
 from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
+from models.pose.clock import WrongClock, wrong_clock
 from models.pose.fusion import fused_estimate
 from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
 from models.pose.picture import PictureEvidence, with_picture
@@ -69,6 +70,11 @@ class PoseFinding:
         groups, moved_prior = self.joint.walking_groups, self.moved_prior
         people = pose_posterior(self.fused, groups, self.prior, moved_prior)
         return people if self.picture is None else with_picture(people, self.picture, moved_prior)
+
+    @cached_property
+    def clock(self) -> WrongClock | None:
+        """How likely the clock is wrong, where places say that the camera stands."""
+        return wrong_clock(self.joint, self.fused, self.posterior, self.moved_prior)
 
     @cached_property
     def drift(self) -> Drift:

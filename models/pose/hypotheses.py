@@ -29,9 +29,8 @@ _SUBSETS = np.array(list(product((False, True), repeat=len(PARAMETERS))))
 _MOVED_IN = np.concatenate([_SUBSETS, _SUBSETS[1:]])
 _FAR = np.arange(len(_MOVED_IN)) >= len(_SUBSETS)
 _ALL = _MOVED_IN.all(axis=1)
-_SCALE, _PAN = (
-    np.equal(_MOVED_IN, np.isin(PARAMETERS, alone)).all(axis=1) for alone in ("height", "heading")
-)
+_ALONE = _MOVED_IN.sum(axis=1) == 1
+_SCALE, _PAN = (_ALONE & _MOVED_IN[:, PARAMETERS.index(name)] for name in ("height", "heading"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,20 +155,18 @@ def pose_posterior(
     offset = fused.values - array_of(prior)
     offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
     noise = fused.covariance[np.ix_(seen, seen)]
-    degrees = _degrees(walking_groups)
+    degrees = degrees_of_freedom(walking_groups)
     moves = move_covariances()
     marginals = noise + moves[:, seen][:, :, seen]
     gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
     squared = np.einsum("i,kij,j->k", offset[seen], np.linalg.inv(marginals), offset[seen])
-    # A mode may be far from a Gaussian: the prior pose is never less likely than people say of it.
-    squared[0] = min(squared[0], max(fused.prior_gap, 0.0))
+    squared[0] = _at_prior(float(squared[0]), fused.prior_gap, walking_groups)
     log_weights = log_prior(moved_prior) + log_student(squared, marginals, degrees)
     means = gains @ offset[seen]
     # The variance of a t: of few groups it is wider than that of a normal distribution.
     heavy = (degrees + squared) / (degrees + seen.sum() - 2)
     covariances = (moves - gains @ moves[:, seen]) * heavy[:, None, None]
     covariances = covariances + np.diag(config.REST_SD**2)
-    log_weights[0] = min(log_weights[0], _by_paths(fused, walking_groups, log_weights, moved_prior))
     if fused.paths_changed:
         away = _FAR & _MOVED_IN[:, PARAMETERS.index("heading")]
         log_weights += np.log(np.where(away, config.LEAVES_PATHS, config.PATHS_CHANGE))
@@ -220,7 +217,7 @@ def off_sd_at_odds(
     """
     priors = log_prior(moved_prior)[: len(_SUBSETS)]
     alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])
-    degrees, size = _degrees(walking_groups), int(seen.sum())
+    degrees, size = degrees_of_freedom(walking_groups), int(seen.sum())
     wider = 1 + config.MOVE_SD[seen, None] ** 2 / variances
     # With x the squared offset by its degrees of freedom, the two t's are to each other as
     # (1 + x) to (1 + x / wider): `ratio`, by the odds that are wanted.
@@ -237,37 +234,36 @@ def drift_of(posterior: PosePosterior, fused: FusedEstimate) -> Drift:
     return drift_between(posterior.parameters, posterior.sd, told, posterior.prior, posterior.move)
 
 
-def _degrees(walking_groups: float | Array) -> Any:
+def degrees_of_freedom(walking_groups: float | Array) -> Any:
     """Degrees of freedom of an estimate: few groups tell less surely what their covariance is."""
     return config.LEAST_FREEDOM + config.FREEDOM_OF_A_GROUP * walking_groups
 
 
 def log_prior(moved_prior: float) -> Array:
-    """Log prior weights (K,): each parameter moves by itself, or all, one turn, or the scale."""
+    """Log prior weights (K,): by itself each, or one angle, all, a far turn, or the scale alone."""
     shares = np.where(_MOVED_IN, config.MOVES_IN, 1 - config.MOVES_IN).prod(axis=1)
-    rest = 1 - config.ALL_SHARE - config.SCALE_SHARE - config.TURNED_SHARE
-    some = rest * shares / (1 - shares[0]) + config.ALL_SHARE * _ALL + config.SCALE_SHARE * _SCALE
+    named = config.ALL_SHARE * _ALL + config.SCALE_SHARE * _SCALE
+    named += config.JOINT_SHARE / len(ANGLES) * (_ALONE & ~_SCALE)
+    rest = 1 - config.ALL_SHARE - config.SCALE_SHARE - config.JOINT_SHARE - config.TURNED_SHARE
+    some = rest * shares / (1 - shares[0]) + named
     some = some * np.where(_FAR, config.FAR_SHARE, 1 - config.FAR_SHARE)
     weights = moved_prior * (some + config.TURNED_SHARE * (_PAN & _FAR))
     weights[0] = 1 - moved_prior
     return np.asarray(np.log(weights))
 
 
-def _by_paths(
-    fused: FusedEstimate, walking_groups: int, log_weights: Array, moved_prior: float
-) -> float:
-    """The most that the log weight of a standing camera may be, by how people fit its paths.
+def _at_prior(squared: float, prior_gap: float, walking_groups: int) -> float:
+    """The squared distance of a standing camera: by a Gaussian, or by people themselves.
 
-    The covariance is of a Gaussian around the best pose; the prior pose can be far outside of what
-    that is good for. There, each walking group says how much worse it fits: a t test, whose mean
-    differs from hour to hour, too.
+    The covariance is of a Gaussian around the best pose, and the prior pose may be outside of what
+    that is good for, either way. What people say of it is at most twice what they lose there in
+    the log posterior; and at least that by what people of other hours lose at the true pose.
     """
-    if fused.prior_loss <= 0:
-        return float(log_weights[0])
-    groups = max(walking_groups, 2)
-    loss = min(fused.prior_loss, config.MOST_LOSS) / math.sqrt(1 + groups * config.HABIT_LOSS**2)
-    ratio = groups / 2 * math.log1p(loss**2 / (groups - 1)) - config.OCCAM
-    return float(logsumexp(log_weights[1:])) - ratio - math.log(moved_prior / (1 - moved_prior))
+    if not math.isfinite(prior_gap):
+        return squared
+    gap = max(prior_gap, 0.0)
+    by_hour = config.OTHER_HOURS + config.OTHER_HOURS_OF_A_GROUP * walking_groups
+    return min(max(squared, gap / by_hour), gap)
 
 
 def log_student(squared: Array, scales: Array, degrees: float) -> Array:

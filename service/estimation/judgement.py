@@ -77,7 +77,8 @@ class Case:
     def judged(self) -> Judgement:
         """The judgement."""
         finding, turned = self.finding, self.finding.posterior.turned
-        clock = clock_fault(self.drift, turned, self.evidence.prior, self.frame_rate_hz)
+        wrong = self._wrong_clock()
+        clock = wrong or clock_fault(self.drift, turned, self.evidence.prior, self.frame_rate_hz)
         chart = self._counting_chart(clock)
         verdict = judge(
             self.drift,
@@ -86,6 +87,7 @@ class Case:
             chart,
             finding.creep,
             enough=finding.enough or finding.posterior.pictured,
+            clock=wrong is not None,
         )
         state = self._state(verdict)
         after, since = self._moved_between(verdict, state)
@@ -95,6 +97,15 @@ class Case:
         return Judgement(
             state=state, reasons=reasons, verdict=verdict, after=after, since=since, clock=clock
         )
+
+    def _wrong_clock(self) -> Reason | None:
+        """The reason of a clock that is surely wrong before a camera that stands; None of none.
+
+        One that was told lasts while it is likelier wrong than not.
+        """
+        clock, told = self.finding.clock, self.history.drifted == ("height",)
+        certainty = LIKELY if told else self.evidence.limits.certainty
+        return None if clock is None else clock.reason(certainty, self.frame_rate_hz)
 
     def _counting_chart(self, clock: Reason | None) -> ChartResult | None:
         """The drift chart's result, unless it is explained without a move."""
@@ -159,7 +170,9 @@ class Case:
             Reason(code=ServiceCode.SITE_CHANGED) if otherwise else None,
             fused.reason if fused.paths_changed else None,
             None if finding.creep is None else reason_of_creep(finding.creep),
-            reason_of_drift(self.drift, verdict, self.evidence.limits),
+            None
+            if clock is not None and verdict.excess < 1
+            else reason_of_drift(self.drift, verdict, self.evidence.limits),
             finding.picture.reason if finding.picture and finding.posterior.pictured else None,
             clock,
             None if finding.reading is None else reason_of_chart(finding.reading),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from models.tracks.scenes import SceneTrack
 from studies.faults.boxes import box_jitter, detector_update, rounding
-from studies.faults.clocks import drifting_clock, dropped_frames, jittered_clock
+from studies.faults.clocks import drifting_clock, dropped_frames, jittered_clock, wrong_rate
 from studies.faults.hidden_feet import hidden_feet, jumps
 from studies.faults.identities import fragments, switches
 from studies.faults.lens_and_ground import (
@@ -14,7 +14,7 @@ from studies.faults.lens_and_ground import (
     wrong_k1,
     wrong_principal_point,
 )
-from studies.faults.traffic import cars, cyclists, runners, standers, strollers
+from studies.faults.traffic import cars, cyclists, other_paths, runners, standers, strollers
 from studies.faults.view import Injector, View
 
 
@@ -57,6 +57,12 @@ FAULTS = {
     "dropped-frames": Fault(injector=dropped_frames, size=0.3, words="30 %"),
     "jittered-clock": Fault(injector=jittered_clock, size=0.2, words="200 ms"),
     "drifting-clock": Fault(injector=drifting_clock, size=0.05, words="5 % fast at the end"),
+    "slow-clock-later": Fault(
+        injector=wrong_rate, size=0.2, words="30 Hz taken for 25, after the reference", later=True
+    ),
+    "fast-clock-later": Fault(
+        injector=wrong_rate, size=-0.17, words="25 Hz taken for 30, after the reference", later=True
+    ),
     "cyclists": Fault(injector=cyclists, size=0.2, words="20 %"),
     "cyclists-later": Fault(
         injector=cyclists, size=0.2, words="20 %, after the reference", later=True
@@ -68,9 +74,15 @@ FAULTS = {
     "running-later": Fault(
         injector=runners, size=0.1, words="10 %, after the reference", later=True
     ),
+    "other-paths-later": Fault(
+        injector=other_paths, size=1.0, words="all, after the reference", later=True
+    ),
     "ramp": Fault(injector=ramp, size=0.05, words="5 %"),
     "wrong-k1": Fault(injector=wrong_k1, size=0.05, words="by 0.05"),
     "wrong-focal-length": Fault(injector=wrong_focal_length, size=0.05, words="by 5 %"),
+    "zoom-later": Fault(
+        injector=wrong_focal_length, size=0.15, words="by 15 %, after the reference", later=True
+    ),
     "wrong-principal-point": Fault(
         injector=wrong_principal_point, size=0.02, words="by 2 % of the width"
     ),

@@ -55,6 +55,20 @@ def drifting_clock(
     ]
 
 
+def wrong_rate(
+    tracks: Sequence[SceneTrack], view: View, size: float, seed: int
+) -> list[SceneTrack]:
+    """Tracks by a clock that is slow, or of a frame rate taken too low: times too long by `size`.
+
+    0.2 is 30 frames a second taken for 25; too short where it is below 0. Nothing is drawn.
+    """
+    start_s, _ = view.span_s
+    return [
+        _stamped(track, start_s + (1 + size) * (track.trajectory.time_s - start_s))
+        for track in tracks
+    ]
+
+
 def _frames(tracks: Sequence[SceneTrack]) -> Array:
     every = [track.trajectory.time_s for track in tracks]
     return np.unique(np.concatenate(every)) if every else np.empty(0)

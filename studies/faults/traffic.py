@@ -12,6 +12,7 @@ import numpy as np
 
 from models.geometry.ground import pixel_from_ground
 from models.geometry.rotation import Array
+from models.geometry.upright import statures, tops_seen
 from models.tracks.scenes import SceneTrack
 from studies.faults.view import View, ground_of, own_rng, seen_again
 from studies.faults.ways import Way, taken_again, way_of
@@ -55,6 +56,33 @@ def strollers(tracks: Sequence[SceneTrack], view: View, size: float, seed: int) 
 def standers(tracks: Sequence[SceneTrack], view: View, size: float, seed: int) -> list[SceneTrack]:
     """Tracks of which a share `size` stop somewhere on their way for 20 to 60 s."""
     return _instead(tracks, view, size, seed, "stander", _stander)
+
+
+def other_paths(
+    tracks: Sequence[SceneTrack], view: View, size: float, seed: int
+) -> list[SceneTrack]:
+    """Tracks of which a share `size` go where the mirror image of the site's people would.
+
+    On the ground, left for right about the line from the camera's foot to the middle of the site: a
+    pace stays as it is, and no pose of a camera makes it of the old paths. Whom it takes out of the
+    picture is not seen.
+    """
+    foot = view.recorded.centre_m[:2]
+    towards = np.median(view.places, axis=0) - foot
+    mirror = 2 * np.outer(towards, towards) / (towards @ towards) - np.eye(2)
+    found = []
+    for track in tracks:
+        seen: SceneTrack | None = track
+        if own_rng(track.person_id or track.track_id, seed).uniform() < size:
+            ground, _ = ground_of(track, view)
+            ground, top_v = foot + (ground - foot) @ mirror, track.trajectory.top_v
+            if top_v is not None:
+                pose, lens, own = view.pose, view.intrinsics, track.trajectory
+                tall, _ = statures(lens, pose.rotation, pose.height_m, own.uv, top_v)
+                top_v = tops_seen(lens, pose.rotation, pose.centre_m, ground, tall)
+            seen = seen_again(track, view, _pixels(ground, view), top_v)
+        found.append(seen)
+    return [track for track in found if track is not None]
 
 
 def _instead(

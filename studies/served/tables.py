@@ -60,7 +60,9 @@ def all_tables(heading: Heading, found: Iterable[CaseResult]) -> str:
     far = [(a, o) for a, o in cases if a.table == Table.FAR]
     if far:
         tables.append(_far_table(far))
-    judged = [(a, o) for a, o in cases if a.table != Table.FAULTS and o.moved is not None]
+    if any(a.table == Table.NAMES for a, _ in cases):
+        tables.append(_name_table([(a, o) for a, o in cases if a.table in _NAMED]))
+    judged = [(a, o) for a, o in cases if a.table not in _FAULTY and o.moved is not None]
     if judged:
         tables.append(_reliability_table(judged))
     return "\n".join(f"{each.rstrip()}\n" for each in tables)
@@ -122,7 +124,7 @@ def _fault_table(cases: _Cases) -> str:
             some = [o for a, o in own if a.fault == fault and a.knock == knock]
             if some:
                 figures = figures_of(some)
-                name = f"{fault} ({FAULTS[fault].words})" if fault else "none"
+                name = _fault_name(fault) if fault else "none"
                 lines.append(
                     _row(
                         name,
@@ -210,27 +212,82 @@ def _far_table(cases: _Cases) -> str:
     return f"**Far pans**, by {_ENOUGH} people and more:\n\n" + "\n".join(lines)
 
 
+def _name_table(cases: _Cases) -> str:
+    """The names that changes get: alerts by the pose alone, and states without one."""
+    rows: dict[str, list[ServedOutcome]] = {}
+    rights: dict[str, str] = {}
+    for a, o in cases:
+        title, right_name = _KNOCKS.get(a.knock, "pan, far"), "-" if a.knock == "still" else "drift"
+        if a.fault:
+            title, right_name = _fault_name(a.fault), _RIGHT_NAMES.get(a.fault, "-")
+        rows.setdefault(title, []).append(o)
+        rights[title] = right_name
+    lines = _head("changed", "n", "name", *_NAMES)
+    right, told, moved, other = 0, 0, 0, 0
+    for title, own in rows.items():
+        said = [_name(o) for o in own]
+        lines.append(_row(title, len(own), rights[title], *(said.count(name) for name in _NAMES)))
+        if (name := rights[title]) != "-":
+            right += said.count(name)
+            told += sum(said.count(alert) for alert in _ALERTS)
+        if name == "drift":
+            moved, other = moved + len(own), other + said.count("clock")
+    words = (
+        f"The right name in {right} of {told} that are told of and have one; "
+        f"the clock's in {other} of {moved} that moved."
+    )
+    return f"**Names**, by the pose alone. {words}\n\n" + "\n".join(lines)
+
+
+_ALERTS = ("drift", "clock", "unsure")
+_NAMES = (*_ALERTS, "suspected", "ok", "learning")
+_NAMED = (Table.TIME, Table.FAR, Table.NAMES)
+_FAULTY = (Table.FAULTS, Table.NAMES)
+_RIGHT_NAMES = {
+    "slow-clock-later": "clock",
+    "fast-clock-later": "clock",
+    "other-paths-later": "unsure",
+}
+
+
+def _fault_name(fault: str) -> str:
+    return f"{fault} ({FAULTS[fault].words})"
+
+
+def _name(outcome: ServedOutcome) -> str:
+    """The alert of an outcome, or the state without one."""
+    if outcome.state == WindowState.DRIFTING:
+        return "clock" if outcome.clock else "drift"
+    return outcome.state or WindowState.LEARNING
+
+
 def _reliability_table(cases: _Cases) -> str:
-    """How many had moved, by how likely that was said to be; shares as if 2 of 10 had moved."""
-    lines = _head("moved", "cases that had", "cases that had not", "share, weighed", "said")
+    """How many had moved, by how likely that was said to be; shares as if 2 of 10 had moved.
+
+    Where few that had not were to be expected, none of them says little.
+    """
+    lines = _head(
+        "moved", "cases that had", "had not", "would not, as said", "share, weighed", "said"
+    )
     said = np.array([o.moved for _, o in cases], dtype=np.float64)
     moved = np.array([a.knock != "still" for a, _ in cases])
-    weights = np.where(
-        moved, MOVED_PRIOR / max(moved.sum(), 1), (1 - MOVED_PRIOR) / max((~moved).sum(), 1)
-    )
+    still_weight = (1 - MOVED_PRIOR) / max((~moved).sum(), 1)
+    weights = np.where(moved, MOVED_PRIOR / max(moved.sum(), 1), still_weight)
     for tenth in range(10):
         own = np.minimum((10 * said).astype(int), 9) == tenth
         if own.any():
             whole = weights[own].sum()
             share = f"{(weights * moved)[own].sum() / whole:.2f}"
-            mean = f"{(weights * said)[own].sum() / whole:.2f}"
+            mean = (weights * said)[own].sum() / whole
+            stills = (weights * moved)[own].sum() * (1 - mean) / mean / still_weight
             lines.append(
                 _row(
                     f"{tenth / 10:.1f} to {(tenth + 1) / 10:.1f}",
                     int((own & moved).sum()),
                     int((own & ~moved).sum()),
+                    f"{stills:.1f}",
                     share,
-                    mean,
+                    f"{mean:.2f}",
                 )
             )
     return "**Reliability** of `moved`, by the pose alone:\n\n" + "\n".join(lines)

@@ -30,6 +30,7 @@ class Table(StrEnum):
     REPLAYS = "replays"
     FEW = "few"
     FAR = "far"
+    NAMES = "names"
 
 
 ALONE = ("tilt-alone", "roll-alone", "height-alone", "pan-alone")
@@ -42,6 +43,7 @@ _KNOCKS = {
 FEW = (8, 15, 20, 40)  # tracks
 FAR_DEG = (12, 20, 30, 45, 60, 90, 120, 150, 180)  # pans, both ways
 MOVES = ("still", "pan-2", "pan")
+LATER = tuple(name for name, fault in FAULTS.items() if fault.later)
 _LONG = 1500  # tracks; of longer recordings parts are taken
 _SIZES = ((200, 100), (1000, 400))
 _WINDOW = 400
@@ -153,6 +155,9 @@ def _case_ids(
     if table == Table.FAR:
         yield from _far_ids(scene, long, seeds, batch)
         return
+    if table == Table.NAMES:
+        yield from _name_ids(scene, long, seeds, batch)
+        return
     sizes: Sequence[tuple[int | None, int]] = _SIZES if long else ((None, _WINDOW),)
     if table == Table.FEW:
         sizes = [(_SIZES[0][0] if long else None, few) for few in FEW]
@@ -191,6 +196,26 @@ def _far_ids(
                 for size in FAR_DEG
                 for turn in ((size, -size) if size < 180 else (size,))
             )
+
+
+def _name_ids(
+    scene: str, long: bool, seeds: Sequence[int], batch: int
+) -> Iterator[tuple[CaseId, ...]]:
+    """What sets in after the reference, before a camera that stands."""
+    for seed in seeds:
+        yield tuple(
+            CaseId(
+                table=Table.NAMES,
+                scene=scene,
+                seed=seed,
+                knock="still",
+                batch=batch,
+                fault=fault,
+                reference=_SIZES[-1][0] if long else None,
+                seen=_WINDOW,
+            )
+            for fault in LATER
+        )
 
 
 def _served(

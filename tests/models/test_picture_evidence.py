@@ -73,7 +73,8 @@ def test_a_picture_alone_weighs_each_hypothesis_by_its_density():
     for own in product((False, True), repeat=4):
         for far, share in ((1.0, 0.85), (5.0, 0.15)):
             odds = math.prod(shares[n] if in_it else 1 - shares[n] for n, in_it in enumerate(own))
-            likely = 0.5 * odds / some + 0.3 * all(own) + 0.1 * (own == (0, 0, 1, 0))
+            likely = 0.4 * odds / some + 0.3 * all(own) + 0.1 * (own == (0, 0, 1, 0))
+            likely += 0.1 / 3 * (sum(own) == 1 and not own[2])
             turned = 0.1 * (far > 1 and own == (0, 0, 0, 1))
             prior = 0.2 * (share * likely + turned) if any(own) else 0.8 * share
             spread = (np.where(own, config.MOVE_SD, 0) * far) ** 2 + rest**2

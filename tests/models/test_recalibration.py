@@ -268,3 +268,16 @@ def test_tracks_that_ended_together_are_in_order(site, tracks):
     found = estimate_pose(crowd, site)
     assert found.change_idx is not None
     assert found.first == 60 <= found.change_idx
+
+
+def test_times_that_are_too_short_are_a_wrong_clock_and_no_move(tracks, site):
+    fast = estimate_pose(seen([replace(t, time_s=0.8 * t.time_s) for t in tracks[1]]), site)
+    assert fast.clock.probability > 0.7
+    assert fast.clock.factor == pytest.approx(0.8, abs=0.04)
+    assert fast.posterior.moved < 0.1
+    assert fast.clock.reason(0.7, 30.0).code is TracksCode.SCALE_CHANGED
+    assert fast.clock.reason(0.99, 30.0) is None
+    for other in (tracks[1], tracks[2]):  # the camera stands, or moved: its clock is right
+        found = estimate_pose(seen(other), site)
+        assert found.clock.probability < 0.05
+        assert found.clock.reason(0.9, 30.0) is None

@@ -203,6 +203,14 @@ def test_a_clock_fault_is_a_jump_in_scale_alone():
         assert clock_fault(found, 0.2, PRIOR, 25.0) is None
 
 
+def test_a_wrong_clock_is_told_before_a_camera_that_stands():
+    stands = drift(move=likely(0.02))
+    told = judge(stands, LIMITS, (), clock=True)
+    assert (told.drifted, told.alarmed, told.drifting) == (("height",), True, True)
+    assert not judge(stands, LIMITS, (), clock=True, enough=False).drifting
+    assert not judge(stands, LIMITS, told.drifted).drifting  # it was put right
+
+
 @pytest.mark.parametrize("drifted", [(), ("tilt",)])
 @pytest.mark.parametrize("moved", [0.0, 0.5, 0.89, 0.9, 0.98, 0.99, 1.0])
 @pytest.mark.parametrize("statistic", [None, 1.0, 50.0])

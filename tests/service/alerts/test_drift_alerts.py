@@ -4,6 +4,7 @@ from datetime import datetime, timedelta
 
 import pytest
 
+from models.pose import WrongClock
 from service.store import references
 from service.training import begin_training, end_training
 from tests.service.bench import PRIOR, moved
@@ -137,6 +138,21 @@ def test_a_jump_in_scale_alone_is_named_a_clock_fault(bench):
     assert "+20 %" in alert["reason"]
     for _ in range(3):
         bench.see(PRIOR)
+    assert [alert["outcome"] for alert in bench.alerts()] == ["cleared"]
+
+
+def test_a_wrong_clock_before_a_camera_that_stands_is_told_until_it_is_right(bench):
+    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.98, factor=1.2))
+    assert bench.alerts() == []
+    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.995, factor=1.2))
+    (alert,) = bench.alerts()
+    assert (alert["kind"], alert["state"]) == ("clock", "firing")
+    assert "as if 30 frames a second were taken for 25" in alert["reason"]
+    assert bench.pose()["state"] == "drifting"
+    assert "beyond" not in bench.pose()["reason"]
+    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.6, factor=1.15))
+    assert len(bench.alerts(state="firing")) == 1
+    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.1, factor=1.02))
     assert [alert["outcome"] for alert in bench.alerts()] == ["cleared"]
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from models.tracks.scenes import Scene
 from studies.faults.boxes import box_jitter, detector_update, rounding
-from studies.faults.clocks import drifting_clock, dropped_frames, jittered_clock
+from studies.faults.clocks import drifting_clock, dropped_frames, jittered_clock, wrong_rate
 from studies.faults.hidden_feet import (
     Thing,
     draw_things,
@@ -114,6 +114,12 @@ def test_a_clock_gains_by_the_square_of_time():
     (moved,) = drifting_clock([one], VIEW, 0.05, 0)
     # 0.05 / 2 of 100 s at the end of 100 s, and a quarter of that in the middle
     assert_allclose(moved.trajectory.time_s, [0, 50.625, 102.5])
+
+
+def test_a_wrong_rate_makes_all_times_too_long_from_the_recordings_begin_on():
+    one = walk("a", straight((-5, 20), (5, 20), 3), start_s=10.0, step_s=5.0)
+    (slow,) = wrong_rate([one], VIEW, 0.2, 0)
+    assert_allclose(slow.trajectory.time_s, [12, 18, 24])
 
 
 def test_a_thing_hides_what_is_below_the_sight_line():

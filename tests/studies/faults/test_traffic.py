@@ -12,7 +12,7 @@ from studies.faults.lens_and_ground import (
     wrong_k1,
     wrong_principal_point,
 )
-from studies.faults.traffic import cars, cyclists, runners, standers, strollers
+from studies.faults.traffic import cars, cyclists, other_paths, runners, standers, strollers
 from tests.studies.faults.sights import places_of, straight, view_on, walk
 
 VIEW = view_on([(-8, 20), (8, 40), (0, 30), (4, 25)])
@@ -63,6 +63,16 @@ def test_a_car_is_seen_by_its_near_side():
     middle = np.abs(ground[:, 0]).argmin()
     assert car.trajectory.uv[middle, 1] == pytest.approx(761.78, abs=0.1)
     assert_allclose(car.trajectory.top_v, 500 + 1000 * 3.5 / 20, atol=1e-6)
+
+
+def test_other_paths_are_the_old_ones_left_for_right_at_the_same_pace():
+    # The middle of the site is straight ahead, so that x becomes -x.
+    view = view_on([(-3, 30), (0, 30), (3, 30)])
+    one = walk("a", straight((1, 20), (4, 30), 51), tall_m=1.8)
+    (other,) = other_paths([one], view, 1.0, 0)
+    assert_allclose(places_of(other), straight((-1, 20), (-4, 30), 51), atol=1e-6)
+    assert_allclose(other.trajectory.top_v, one.trajectory.top_v, atol=1e-6)
+    assert_allclose(other.trajectory.time_s, one.trajectory.time_s)
 
 
 def test_a_stroller_is_the_lower_edge_where_it_is_nearer():

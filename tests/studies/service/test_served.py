@@ -131,7 +131,30 @@ def test_few_tracks_far_pans_and_how_reliable_moved_was(tmp_path):
     assert "| ±45 | 2 | 0 | 0 | 0 | 1 | 1 | 0.2 (0.2, 0) |" in said
     # Three had moved, one had not: 0.2 of the weight is the three's.
     mean = (0.2 * (0.95 + 0.93 + 0.95) / 3) + 0.8 * 0.91
-    assert f"| 0.9 to 1.0 | 3 | 1 | 0.20 | {mean:.2f} |" in said
+    # That many would not have: of 0.2 that had, as the mean has it, each of 0.8.
+    would = 0.2 * (1 - mean) / mean / 0.8
+    assert f"| 0.9 to 1.0 | 3 | 1 | {would:.1f} | 0.20 | {mean:.2f} |" in said
+
+
+def test_names_are_counted_beside_the_right_ones(tmp_path):
+    kept = OutcomeFile(tmp_path / "p.jsonl")
+    slow = replace(CASE, table=Table.NAMES, fault="slow-clock-later")
+    told = replace(SERVED, state="drifting", moved=0.99)
+    clock = replace(told, clock=True)
+    rows = [
+        CaseResult(case_id=replace(CASE, knock="tilt-alone"), outcome=told),
+        CaseResult(case_id=replace(CASE, knock="tilt-alone", seed=1), outcome=clock),
+        CaseResult(case_id=replace(CASE, table=Table.FAR, knock="pan-45"), outcome=told),
+        CaseResult(case_id=slow, outcome=clock),
+        CaseResult(case_id=replace(slow, seed=1), outcome=replace(SERVED, state="suspected")),
+        CaseResult(case_id=replace(slow, fault="zoom-later"), outcome=told),
+    ]
+    said = all_tables(kept.heading, rows)
+    assert "| tilt alone | 2 | drift | 1 | 1 | 0 | 0 | 0 | 0 |" in said
+    assert "| pan, far | 1 | drift | 1 | 0 | 0 | 0 | 0 | 0 |" in said
+    assert "after the reference) | 2 | clock | 0 | 1 | 0 | 1 | 0 | 0 |" in said
+    assert "| zoom-later (by 15 %, after the reference) | 1 | - | 1 | 0 | 0 | 0 | 0 | 0 |" in said
+    assert "The right name in 3 of 4 that are told of and have one; the clock's in 1 of 3" in said
 
 
 def test_tables_are_put_between_the_markers_of_a_page(tmp_path):
