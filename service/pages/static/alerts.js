@@ -2,7 +2,7 @@
 
 import { announce, guarded } from "./act.js";
 import { ALERT_ACTS, listen } from "./alert_acts.js";
-import { answer, offer as offerFor, withMany } from "./bulk_acts.js";
+import { answer, offer as offerFor, undoneHere, withMany } from "./bulk_acts.js";
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
 import { _ } from "./words.js";
@@ -30,7 +30,9 @@ async function refresh() {
   if (!answer.ok || answer.redirected) return;
   const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
   const kept = new Set(picked().map((row) => row.id));
-  const focused = list.contains(document.activeElement) ? document.activeElement : null;
+  const active = document.activeElement;
+  // A button that waits for its answer is disabled, and has lost the focus.
+  const focused = list.contains(active) ? active : active === document.body ? list.querySelector("button[aria-busy]") : null;
   const held = focused?.closest("li.alert-row");
   const at = [...list.querySelectorAll("li.alert-row")].indexOf(held);
   list.replaceChildren(...fresh.getElementById("alerts").childNodes);
@@ -73,7 +75,7 @@ subscribe(
   ((soon) => (event) => event.type === "alert" && soon(event))(
     gathered((events) => {
       again();
-      const news = events.findLast(({ data }) => data.message === "alert.opened");
+      const news = events.findLast(({ data }) => data.message === "alert.opened" && !undoneHere(data));
       if (news) announce(_("A new alert: {name}", { name: news.data.camera_id ?? news.data.track_source }));
     }, 300),
   ),

@@ -115,7 +115,12 @@ function sayDone(word, items, refused, undo) {
 
 // --- And undone ----------------------------------------------------------------------------------
 
+const QUIET_MS = 10_000;
+const undone = new Map();
 let over = null;
+
+/** True of a camera whose answer was just undone here: that its alert is open again is no news. */
+export const undoneHere = ({ camera_id: camera }) => undone.get(camera) > Date.now();
 
 /** Say what was done, and offer to undo it as long as that is taken; else say it for a while. */
 function offerUndo(words, undo) {
@@ -131,6 +136,7 @@ function offerUndo(words, undo) {
   said.textContent = words;
   const items = undo.ids.map((camera) => ({ camera }));
   const back = async () => {
+    for (const id of undo.ids) undone.set(id, Date.now() + QUIET_MS); // events may come before the answer
     if ((await actOn("undo", items.map((item) => [item.camera, item]), items)) !== undefined) close();
   };
   place.replaceChildren(said, buttonOf(_("Undo"), "", back), buttonOf("×", _("Close"), close));

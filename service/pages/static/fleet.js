@@ -3,7 +3,7 @@
 
 import { announce, call, guarded } from "./act.js";
 import { ALERT_ACTS, done, listen } from "./alert_acts.js";
-import { answer, offer, withMany } from "./bulk_acts.js";
+import { answer, offer, undoneHere, withMany } from "./bulk_acts.js";
 import { signed } from "./dialogs.js";
 import { gathered, subscribe } from "./events.js";
 import { showPlaces, within } from "./places.js";
@@ -191,7 +191,7 @@ async function look(events) {
     return;
   }
   // What somebody has done with an alert is seen, and is no news to call out.
-  const alert = events.findLast(({ data }) => CALLED_OUT.includes(data.message));
+  const alert = events.findLast(({ data }) => CALLED_OUT.includes(data.message) && !undoneHere(data));
   if (alert) announce(wordsOf(alert.data));
 }
 

@@ -162,7 +162,7 @@ def test_the_newest_may_be_of_a_move_though_the_window_is_shorter(known):
     assert len(due(known).trajectories) == WANTED + 50
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.timeout(900)
 def test_a_creep_is_told_and_the_pose_is_by_the_first_map(known):
     live(known, 10)

@@ -13,7 +13,7 @@ from tests.service.estimation.test_growth import WANTED, make_street, map_of
 from tests.service.street import PRIOR
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_worker_killed_while_tracks_come_grows_one_map(service):
     service.start_again(flow_unsure_tracks=0, window_tracks=40)
     wait_for(service.ready)

@@ -64,7 +64,7 @@ def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
 def test_it_may_have_moved_before_an_alert_says_so(bench):
     bench.see(moved(tilt_deg=5.0), sd_deg=1.1)
     assert headline(bench.http) == (
-        "It may have moved (81 %): it turned 3.7° (tilt +3.7°). The next people will tell."
+        "It may have moved (82 %): it turned 3.8° (tilt +3.8°). The next people will tell."
     )
 
 

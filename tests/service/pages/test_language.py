@@ -86,7 +86,7 @@ def test_a_page_says_numbers_and_days_in_german(bench):
     text = bench.http.get("/ui/cameras/corner", headers=GERMAN).text
     assert re.search(
         r"Die Kamera ist verstellt: um 5,8° gedreht \(Schwenk −3,0°, Neigung \+5,0°\), etwa "
-        r"\d\d:\d\d.*; genau auf ±0,4°\.",
+        r"(gestern )?\d\d:\d\d; genau auf ±0,4°\.",
         text,
     )
     assert "Eine Person in 10 m erscheint jetzt 2,4 m zu weit weg" in text

@@ -122,7 +122,7 @@ def test_tracks_posted_while_their_camera_is_looked_at_are_looked_at_too(start):
     assert log_of(service).count("estimate_stored") < 40
 
 
-@pytest.mark.parametrize("jump_s", [-3600, 3600])
+@pytest.mark.parametrize("jump_s", [pytest.param(-3600, marks=pytest.mark.nightly), 3600])
 def test_a_clock_that_is_set_stops_nothing_and_doubles_nothing(start, tmp_path, jump_s):
     clock = Clock(tmp_path)
     if clock.environment is None:

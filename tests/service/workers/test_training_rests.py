@@ -17,7 +17,7 @@ from service.workers.train import may_go_on, train_apart
 _RESTS = 6  # ticks, each of half a second: no step of this training takes that long
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_it_rests_while_it_may_not_go_on_and_its_limit_with_it(settings, lens, pose):
     fresh = replace(recipe.DEFAULT, start="fresh", learning_rate=0.002)
     small = replace(fresh, random_poses=256, walks_per_pose=2, epochs=4, batch=32)
