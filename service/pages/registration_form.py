@@ -34,14 +34,13 @@ Made = TypeVar("Made", bound=BaseModel)
 Typed = Annotated[str, Field(max_length=2000)]
 _FOLLOWS = "default_factory_not_called"  # of another error, which is told
 _SEPARATORS = re.compile(r"[\s,;\[\]()]+")
-_AT_MOST = N_("at most {le:g} is taken, got {got}")
 # What pydantic finds wrong, in the words of who types; `got` is what was typed.
 _REASONS = {
     "missing": N_("is needed"),
     "int_from_float": N_("a whole number is needed, got {got}"),
     "greater_than": N_("more than {gt:g} is needed, got {got}"),
     "greater_than_equal": N_("at least {ge:g} is needed, got {got}"),
-    "less_than_equal": _AT_MOST,
+    "less_than_equal": N_("at most {le:g} is taken, got {got}"),
     "string_too_long": N_("at most {max_length} letters are taken"),
     "string_pattern_mismatch": N_("small letters, digits and hyphens are needed"),
 }
@@ -305,11 +304,10 @@ def _field_error(item: ErrorDetails) -> FieldError:
 
 def _of_matrix(error: FieldError) -> FieldError:
     """The same of the field that R and t were typed into."""
-    name = error.pointer[1:]
-    reason = error.reason
-    too_high = _(_AT_MOST).partition("{")[0]
-    if name == "height_m" and not reason.startswith(too_high):
-        reason = _(_UNDER_GROUND, height=reason.split()[-1])
+    name, reason = error.pointer[1:], error.reason
+    got = reason.split()[-1]
+    if name == "height_m" and not float(got) > 0:
+        reason = _(_UNDER_GROUND, height=got)
     return FieldError(pointer=f"/{_OF_MATRIX.get(name, name)}", reason=reason)
 
 

@@ -107,6 +107,13 @@ def test_a_form_is_answered_in_german(http):
     assert says[0]["text"].startswith("Die Kamera schaut 20,0° nach oben, also sind nur 12 % des")
     refused = http.post("/ui/register", json=typed | {"fx": ""}, headers=GERMAN).json()["errors"]
     assert refused == [{"pointer": "/fx", "reason": "wird gebraucht"}]
+    # A height that R and t make is too much, and not under the ground, in each language.
+    turned = {"form": "matrix", "rotation": "1.5707963 0 0", "translation_m": "0 20000 0"}
+    for said in (GERMAN, {}):
+        high = http.post("/ui/register", json=typed | turned, headers=said).json()["errors"]
+        assert high == [
+            {"pointer": "/translation_m", "reason": "at most 10000 m are taken, got 20000"}
+        ]
 
 
 @pytest.fixture
