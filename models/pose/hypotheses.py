@@ -216,7 +216,7 @@ def off_sd_at_odds(
     windows.
     """
     priors = log_prior(moved_prior)[: len(_SUBSETS)]
-    alone = (_SUBSETS.sum(axis=1) == 1) @ (_SUBSETS * priors[:, None])
+    alone = _ALONE[: len(_SUBSETS)] @ (_SUBSETS * priors[:, None])
     degrees, size = degrees_of_freedom(walking_groups), int(seen.sum())
     wider = 1 + config.MOVE_SD[seen, None] ** 2 / variances
     # With x the squared offset by its degrees of freedom, the two t's are to each other as

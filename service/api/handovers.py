@@ -49,7 +49,9 @@ router = APIRouter(prefix="/handovers", tags=["operation"], route_class=NamingRo
 
 
 @router.get("")
-def list_last(session: ReadDep, limit: Annotated[int, Query(ge=1, le=100)] = 20) -> HandoverList:
+def list_last(
+    session: ReadDep, limit: Annotated[int, Query(ge=1, le=100)] = handover.LAST
+) -> HandoverList:
     """The handovers that were given last."""
     return HandoverList.model_validate({"items": handover.last_handovers(session, limit)})
 

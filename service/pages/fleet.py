@@ -48,7 +48,6 @@ from service.wording.language import _
 from service.wording.reasons import group_in_words
 from service.wording.times import Clock
 
-_HANDOVERS = 20  # the newest: what nobody has taken is among them
 _HISTORY = 24  # estimates of a sparkline
 PAGE = 50  # rows at once: more are neither read nor laid out in no time
 # No reference can be learned there yet.
@@ -235,6 +234,8 @@ def show(
         page_size=PAGE,
         groups=groups,
         handovers=_handovers(session),
+        act_words=ACTS,
+        rule=bulk_rule(),
         **_words(request, state),
     )
 
@@ -273,7 +274,7 @@ def banners(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse
 
 def _handovers(session: Session) -> list[Handover]:
     """Those of the last that nobody has taken over, the oldest first."""
-    return [each for each in last_handovers(session, _HANDOVERS) if each.taken_at is None][::-1]
+    return [each for each in last_handovers(session) if each.taken_at is None][::-1]
 
 
 def _words(request: Request, state: AppState) -> dict[str, Any]:
@@ -283,8 +284,6 @@ def _words(request: Request, state: AppState) -> dict[str, Any]:
         registers=caller is None or caller.may(TokenScope.ADMIN),
         operates=caller is None or caller.may(TokenScope.OPERATE),
         words=alert_words,
-        act_words=ACTS,
-        rule=bulk_rule(),
         clock=Clock(now=datetime.now(UTC), zone=state.settings.zone),
         states=STATES,
         in_words=group_in_words,

@@ -18,7 +18,6 @@ from service.wording import alerts as alert_words
 from service.wording.times import Clock
 
 _SHIFTS_H = (8, 12, 24)
-_LAST = 20
 
 router = APIRouter(include_in_schema=False)
 
@@ -33,7 +32,7 @@ def show(
 ) -> HTMLResponse:
     """The shift since a time or of some hours; since the last handover of a day, if unsaid."""
     clock = Clock(now=datetime.now(UTC), zone=state.settings.zone)
-    given = last_handovers(session, _LAST)
+    given = last_handovers(session)
     since = from_
     if since is None and hours is None and given and clock.now - given[0].at < timedelta(days=1):
         since = given[0].at

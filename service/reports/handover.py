@@ -21,6 +21,7 @@ from service.store.references import MaintenanceRecord
 from service.wording.alerts import entry_words, is_act
 from service.wording.times import Clock
 
+LAST = 20  # handovers: what nobody has taken is among them
 _MOST_ALERTS, _MOST_ACTS = 500, 5_000
 
 
@@ -112,10 +113,10 @@ def hand_over(session: Session, since: datetime, text: str | None, by: str | Non
         details={"since": json_time(since)},
     )
     session.flush()
-    return show_handover(session, handover_id)
+    return _find(session, handover_id)
 
 
-def show_handover(session: Session, handover_id: str) -> Handover:
+def _find(session: Session, handover_id: str) -> Handover:
     """A handover.
 
     Raises:
@@ -134,15 +135,15 @@ def take_over(session: Session, handover_id: str, by: str | None) -> Handover:
         NotFoundError: there is none of that id.
         ConflictError: somebody has taken it.
     """
-    found = show_handover(session, handover_id)
+    found = _find(session, handover_id)
     if found.taken_at is not None:
         raise ConflictError(f"handover: {found.taken_by or 'somebody'} has taken it over")
     note_activity(session, Activity.HANDOVER_TAKEN, by=by, subject_id=handover_id)
     session.flush()
-    return show_handover(session, handover_id)
+    return _find(session, handover_id)
 
 
-def last_handovers(session: Session, limit: int) -> list[Handover]:
+def last_handovers(session: Session, limit: int = LAST) -> list[Handover]:
     """The handovers that were given last, newest first."""
     given = journal.newest_entries(session, Activity.HANDOVER_GIVEN, limit)
     taken = journal.entries_about(session, Activity.HANDOVER_TAKEN, [e.subject_id for e in given])

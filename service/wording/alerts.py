@@ -110,7 +110,7 @@ _TOLD_AS = {
 # A test alert's description.
 TEST_ENDS = "This is a test of surefoot; it ends by itself."
 # By a person; of those that the service does by itself, what happened.
-DONE = {
+_DONE = {
     Activity.CAMERA_REGISTERED: N_("{who} registered the camera"),
     Activity.CAMERA_CHANGED: N_("{who} changed what is said of the camera"),
     Activity.CAMERA_DESCRIBED: N_("{who} changed its {fields}"),
@@ -316,7 +316,7 @@ def alert_summary(
 
 def is_act(entry: ActivityRecord) -> bool:
     """True of what a person did to cameras and alerts."""
-    return entry.what in DONE and not _by_itself(entry)
+    return entry.what in _DONE and not _by_itself(entry)
 
 
 def _by_itself(entry: ActivityRecord) -> bool:
@@ -340,7 +340,7 @@ def entry_words(entry: ActivityRecord, clock: Clock) -> str:
     elif _by_itself(entry):
         sentence = _(_BY_ITSELF[entry.what], **words)
     else:
-        done = DONE.get(entry.what, f"{{who}} {entry.what}")
+        done = _DONE.get(entry.what, f"{{who}} {entry.what}")
         sentence = _(done, **words)
     note = _(entry.note) if entry.by is None and entry.note else entry.note
     return f"{sentence}. {note}" if note else f"{sentence}."

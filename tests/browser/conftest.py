@@ -49,9 +49,13 @@ def page(browser: Any, server: RunningService) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def watched(browser: Any, server: RunningService) -> Iterator[tuple[Any, list[str]]]:
-    """A page of 1280 x 800, and the list into which goes what must not happen on it."""
-    context = browser.new_context(base_url=server.url, viewport={"width": 1280, "height": 800})
+def watched(browser: Any, server: RunningService, **more: Any) -> Iterator[tuple[Any, list[str]]]:
+    """A page of 1280 x 800, and the list into which goes what must not happen on it.
+
+    `more` is what a context takes beside, its `locale` say.
+    """
+    size = {"width": 1280, "height": 800}
+    context = browser.new_context(base_url=server.url, viewport=size, **more)
     made = context.new_page()
     made.set_default_timeout(15_000)
     wrong = no_foreign_requests(made, server.url)

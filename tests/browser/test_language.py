@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.browser.conftest import axe, shoot, too_wide
+from tests.browser.conftest import axe, shoot, too_wide, watched
 from tests.service.fleet_bench import Fleet
 
 pytestmark = pytest.mark.slow
@@ -16,15 +16,8 @@ PAGES = (
 
 @pytest.fixture
 def page(browser, server):
-    context = browser.new_context(
-        base_url=server.url, viewport={"width": 1280, "height": 800}, locale="de-DE"
-    )
-    made = context.new_page()
-    made.set_default_timeout(15_000)
-    wrong = []
-    made.on("pageerror", lambda error: wrong.append(str(error)))
-    yield made
-    context.close()
+    with watched(browser, server, locale="de-DE") as (made, wrong):
+        yield made
     assert wrong == []
 
 

@@ -11,6 +11,7 @@ from service.app import create_app
 from service.settings import Settings
 from tests.conftest import CAMERA, Once
 from tests.service.bench import Bench
+from tests.service.fleet_bench import Fleet
 from tests.service.notifications.post_room import PostRoom
 from tests.service.notifications.receiver import Receiver, receiver
 from tests.service.street import Street
@@ -37,6 +38,14 @@ def corner(http: TestClient) -> TestClient:
 def bench(corner: TestClient, settings: Settings) -> Bench:
     """The camera `corner` with a reference, and estimates that a test makes up."""
     return Bench(corner, settings.model_copy(update={"window_tracks": 20}))
+
+
+@pytest.fixture
+def fleet(http: TestClient, settings: Settings) -> Iterator[Fleet]:
+    """Cameras, estimates and alerts written straight into the store of the application."""
+    made = Fleet(settings)
+    yield made
+    made.close()
 
 
 @pytest.fixture

@@ -27,13 +27,14 @@ class ReportRounds:
     def run(self, context: JobContext) -> None:
         """Make the report, if one is due, and mail it and what was escalated, if it is not yet."""
         _make(context)
-        self._mail_escalated(context)
-        self._mail_report(context)
+        for mail in (self._mail_escalated, self._mail_report):
+            if time.monotonic() >= self._again_s:
+                mail(context)
 
     def _mail_report(self, context: JobContext) -> None:
         with context.store.read() as session:
             record = sending.unmailed(session, context.settings)
-        if record is None or time.monotonic() < self._again_s:
+        if record is None:
             return
         error, taken = self._send(
             context.settings, record.subject, record.text, record.id, record.made_at
@@ -44,7 +45,7 @@ class ReportRounds:
     def _mail_escalated(self, context: JobContext) -> None:
         with context.store.read() as session:
             mail = escalated.next_mail(session, context.settings)
-        if mail is None or time.monotonic() < self._again_s:
+        if mail is None:
             return
         error, taken = self._send(
             context.settings, mail.subject, mail.text, mail.id, datetime.now(UTC)

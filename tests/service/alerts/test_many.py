@@ -14,16 +14,8 @@ from service.reasons import as_said
 from service.store.alerts import AlertRecord, answers_of
 from service.wording import alerts as alert_words
 from tests.service.conftest import problem
-from tests.service.fleet_bench import Fleet
 
 HTML = {"Accept": "text/html"}
-
-
-@pytest.fixture
-def fleet(http, settings):
-    made = Fleet(settings)
-    yield made
-    made.close()
 
 
 @pytest.fixture

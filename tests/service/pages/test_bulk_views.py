@@ -14,18 +14,11 @@ from service.enums import PoseState
 from service.operations.health import load_metrics
 from service.pages.fleet import list_fleet
 from tests.service.conftest import problem
-from tests.service.fleet_bench import Fleet, every_state
+from tests.service.fleet_bench import every_state
 
 GOLDEN = Path(__file__).parents[3] / "tests" / "golden" / "fleet.json"
 # What is of this moment or of this process, and not of a camera's state.
 MOMENTARY = ("last_track", "oldest_unseen", "queue_lag", "http_", "build")
-
-
-@pytest.fixture
-def fleet(http, settings):
-    made = Fleet(settings)
-    yield made
-    made.close()
 
 
 def said(http, fleet):

@@ -17,15 +17,8 @@ from service.store.estimates import EstimateRecord
 from service.wording.moves import height_change
 from service.wording.times import Clock, duration
 from tests.service.bench import moved
-from tests.service.fleet_bench import Fleet, afternoon
+from tests.service.fleet_bench import afternoon
 from tests.stores.databases import only_sqlite
-
-
-@pytest.fixture
-def fleet(http, settings):
-    made = Fleet(settings)
-    yield made
-    made.close()
 
 
 def rows(html):

@@ -4,17 +4,7 @@ import html
 import re
 from datetime import UTC, datetime, timedelta
 
-import pytest
-
 from tests.service.conftest import problem
-from tests.service.fleet_bench import Fleet
-
-
-@pytest.fixture
-def fleet(http, settings):
-    made = Fleet(settings)
-    yield made
-    made.close()
 
 
 def hours(count):
