@@ -17,6 +17,7 @@ from models.geometry.pose import CameraPose
 from service.settings import Settings
 from tests.running import RunningService, free_port
 from tests.stores import databases, server
+from tests.stores.statements import share_statements
 
 # The name that starlette's TestClient asks by.
 os.environ.setdefault("SUREFOOT_ALLOWED_HOSTS", "testserver")
@@ -54,6 +55,7 @@ Once = Callable[[str, Callable[[Path], None]], Path]
 
 def pytest_configure(config: pytest.Config) -> None:
     databases.begin_run()
+    share_statements()
     if server.wanted():
         # Stores that a test leaves behind close with it, as SQLite's do without a word.
         left = "ignore:<psycopg.Connection object:ResourceWarning"

@@ -1,6 +1,6 @@
 """Lines as SVG path data: cut to a frame, without points that nobody would miss."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,75 +31,45 @@ def svg(kind: str, view_box: str, label: str, parts: Iterable[str]) -> Markup:
 
 def path_data(lines: Iterable[Array], frame: Frame) -> str:
     """The `d` of a path of polylines (N, 2), cut to a frame; NaN points break a line."""
-    parts = []
-    for line in lines:
-        for run in _runs(line, frame):
-            kept = _thinned(run)
-            parts.append("M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in kept))
-    return "".join(parts)
+    return "".join(
+        "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in _thinned(run).tolist())
+        for line in lines
+        for run in _runs(line, frame)
+    )
 
 
-def _runs(line: Array, frame: Frame) -> Iterator[list[tuple[float, float]]]:
-    run: list[tuple[float, float]] = []
-    for start, end in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):
-        cut = _cut(start, end, frame)
-        if cut is None:
-            if run:
-                yield run
-            run = []
-            continue
-        if run and run[-1] != cut[0]:
-            yield run
-            run = []
-        run = [*run, cut[1]] if run else [*cut]
-    if run:
-        yield run
-
-
-def _cut(
-    start: list[float], end: list[float], frame: Frame
-) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """The part of a segment within a frame, or None.
+def _runs(line: Array, frame: Frame) -> list[Array]:
+    """The parts of a line within a frame, (N, 2) each.
 
     Source: Liang and Barsky, "A New Concept and Method for Line Clipping", 1984.
     """
-    (x, y), (to_x, to_y) = start, end
-    across, down = to_x - x, to_y - y
-    if not np.isfinite(across + down):
-        return None
-    enters, leaves = 0.0, 1.0
-    for step, room in (
-        (-across, x - frame.left),
-        (across, frame.right - x),
-        (-down, y - frame.top),
-        (down, frame.bottom - y),
-    ):
-        if step == 0.0:
-            if room < 0:
-                return None
-        elif step < 0:
-            enters = max(enters, room / step)
-        else:
-            leaves = min(leaves, room / step)
-    if enters > leaves:
-        return None
-    first = (x, y) if enters == 0.0 else (x + enters * across, y + enters * down)
-    last = (to_x, to_y) if leaves == 1.0 else (x + leaves * across, y + leaves * down)
-    return first, last
+    start, step = line[:-1], np.diff(line, axis=0)
+    low, high = (frame.left, frame.top), (frame.right, frame.bottom)
+    level = step == 0.0  # along an edge: within it or never
+    beside = np.where((low <= start) & (start <= high), -2.0, 2.0)
+    slope = np.where(level, 1.0, step)
+    edges = (low - start) / slope, (high - start) / slope
+    enters = np.where(level, beside, np.minimum(*edges)).max(1).clip(min=0.0)[:, None]
+    leaves = np.where(level, -beside, np.maximum(*edges)).min(1).clip(max=1.0)[:, None]
+    firsts = np.where(enters == 0.0, start, start + enters * step)
+    lasts = np.where(leaves == 1.0, line[1:], start + leaves * step)
+    (seen,) = np.nonzero((enters <= leaves)[:, 0])  # never of a NaN
+    breaks = (np.diff(seen) > 1) | (firsts[seen[1:]] != lasts[seen[:-1]]).any(1)
+    segments = np.split(seen, np.flatnonzero(breaks) + 1) if len(seen) else []
+    return [np.concatenate([firsts[some[:1]], lasts[some]]) for some in segments]
 
 
-def _thinned(run: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The run without points on the line of what is kept; a bow is followed by its points."""
-    if len(run) < 3:
-        return run
-    points = np.array(run)
-    kept, first = [run[0]], 0
-    for last in range(2, len(run)):
-        chord = points[last] - points[first]
-        length = float(np.hypot(*chord)) or 1.0
-        between = points[first + 1 : last] - points[first]
-        off = np.abs(between[:, 0] * chord[1] - between[:, 1] * chord[0]) / length
-        if off.max() > _STRAIGHT_PX:
-            first = last - 1
-            kept.append(run[first])
-    return [*kept, run[-1]]
+def _thinned(run: Array) -> Array:
+    """The run (N, 2) without points near the chord of what is kept; a bow keeps its points.
+
+    Source: Douglas and Peucker, "Algorithms for the Reduction of the Number of Points Required to
+    Represent a Digitized Line", 1973.
+    """
+    chord, between = run[-1] - run[0], run[1:-1] - run[0]
+    length = float(np.hypot(*chord))
+    across = between[:, 0] * chord[1] - between[:, 1] * chord[0]
+    off = np.abs(across) / length if length else np.hypot(*between.T)
+    if len(run) < 3 or off.max() <= _STRAIGHT_PX:
+        return run[[0, -1]]
+    farthest = int(off.argmax()) + 1
+    return np.concatenate([_thinned(run[: farthest + 1])[:-1], _thinned(run[farthest:])])
