@@ -46,6 +46,9 @@ class Attendance:
         return any(from_s <= now.timestamp() < to_s for from_s, to_s in self.spans)
 
 
+_UNATTENDED = Attendance(spans=(), judged_from_s=None, announced=())
+
+
 def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance:
     """The times in which somebody was at a camera."""
     return attendance_by(references.maintenance_of(session, camera_id), now)
@@ -53,6 +56,8 @@ def attendance_of(session: Session, camera_id: str, now: datetime) -> Attendance
 
 def attendance_by(records: Sequence[MaintenanceRecord], now: datetime) -> Attendance:
     """The same by windows in the order of their beginnings; overlapping ones are one time."""
+    if not records:
+        return _UNATTENDED  # nearly all of a fleet's cameras
     spans: list[tuple[float, float]] = []
     for record in records:
         from_s, to_s = record.from_at.timestamp(), record.until.timestamp()

@@ -24,7 +24,7 @@ from sqlalchemy import (
     true,
     values,
 )
-from sqlalchemy.orm import InstrumentedAttribute, Session, aliased, defer, load_only
+from sqlalchemy.orm import Bundle, InstrumentedAttribute, Session, aliased, defer
 
 from models.monitoring.verdict import DriftLimits
 from service.enums import AlertState, Origin
@@ -66,13 +66,11 @@ def newest(session: Session, ids: Ids = None, *, lean: bool = False) -> dict[str
 
     Of thousands of cameras the rest takes twice as long, most of it to read JSON.
     """
-    query = _newest(some=ids is not None, whole=ids is not None and len(ids) == 1)
-    if lean:
-        query = query.options(*_LEAN)
+    query = _newest(some=ids is not None, whole=ids is not None and len(ids) == 1, lean=lean)
     return {
         camera_id: Newest(
             reference=reference,
-            estimate=estimate,
+            estimate=None if estimate is None or estimate.id is None else estimate,
             last_track_s=ended_s,
             rhythm=profile or None,
             fires=bool(fires),
@@ -106,25 +104,24 @@ def newest_identifiable_estimates(
     return {record.camera_id: record for record in session.scalars(query)}
 
 
-# Whatever else is asked of such a row is an error, and not a statement more for each camera.
-_LEAN = (
-    load_only(
-        *(EstimateRecord.reference_id, EstimateRecord.state, EstimateRecord.identifiable),
-        *(EstimateRecord.drift_since, EstimateRecord.to_s, EstimateRecord.created_at),
-        raiseload=True,
+# Rows of what tells states: whatever else is asked of one is an error, and no statement more.
+_E, _R = EstimateRecord, SiteReferenceRecord
+_LEAN: tuple[Any, Any] = (
+    Bundle(
+        "reference",
+        *(_R.id, _R.camera_id, _R.source, _R.origin, _R.from_s, _R.to_s, _R.window_from_s),
+        *(_R.answer, _R.answered_at, _R.created_at, _R.ready_at),
     ),
-    load_only(
-        *(SiteReferenceRecord.camera_id, SiteReferenceRecord.source, SiteReferenceRecord.origin),
-        *(SiteReferenceRecord.from_s, SiteReferenceRecord.to_s, SiteReferenceRecord.window_from_s),
-        *(SiteReferenceRecord.answer, SiteReferenceRecord.answered_at),
-        *(SiteReferenceRecord.created_at, SiteReferenceRecord.ready_at),
-        raiseload=True,
+    Bundle(
+        "estimate",
+        *(_E.id, _E.reference_id, _E.state, _E.identifiable),
+        *(_E.drift_since, _E.to_s, _E.created_at),
     ),
 )
 
 
 @cache
-def _newest(*, some: bool, whole: bool) -> Select[Any]:
+def _newest(*, some: bool, whole: bool, lean: bool) -> Select[Any]:
     """One statement: each that a request for a pose asks takes as long as all it looks up."""
     of_camera = TrackRecord.camera_id == CameraRecord.id
     last = select(func.max(TrackRecord.ended_s)).where(
@@ -139,8 +136,7 @@ def _newest(*, some: bool, whole: bool) -> Select[Any]:
     query = (
         select(
             CameraRecord.id,
-            SiteReferenceRecord,
-            EstimateRecord,
+            *(_LEAN if lean else (SiteReferenceRecord, EstimateRecord)),
             last.correlate(CameraRecord).scalar_subquery(),
             RhythmRecord.profile,
             fires.correlate(CameraRecord),
@@ -154,8 +150,10 @@ def _newest(*, some: bool, whole: bool) -> Select[Any]:
         .outerjoin(RhythmRecord, RhythmRecord.camera_id == CameraRecord.id)
         .where(among_given(CameraRecord.id, some=some))
         .order_by(CameraRecord.id)
-        .options(defer(SiteReferenceRecord.data))
     )
+    if lean:
+        return query
+    query = query.options(defer(SiteReferenceRecord.data))
     return query if whole else query.options(defer(EstimateRecord.raw))
 
 
