@@ -27,6 +27,7 @@ class TracksCode(StrEnum):
     CHART = "chart"
     CREPT = "crept"
     SCALE_CHANGED = "scale_changed"
+    LENS_CHANGED = "lens_changed"
     PATHS_CHANGED = "paths_changed"
     WAYS_CHANGED = "ways_changed"
     HEADING_AMBIGUOUS = "heading_ambiguous"

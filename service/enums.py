@@ -71,6 +71,7 @@ class AlertKind(StrEnum):
     DRIFT = "drift"
     NO_DATA = "no_data"
     CLOCK = "clock"
+    LENS = "lens"
     UNSURE = "unsure"
     STALE = "stale"
     TRACKER = "tracker"

@@ -45,6 +45,7 @@ OTHERS = {
     ("workers/upkeep/reconciliation.py", "stale"): "the name of a log line",
     ("workers/context.py", "upkeep"): "the engine's name of a job",
     ("workers/upkeep/periodic.py", "clock"): "the name of a round",
+    ("pages/registration.py", "lens"): "a word for people",
     ("reasons.py", "maintenance"): "the code of a reason, defined there",
     ("alerts/alerts.py", "drift"): "the name of a field",
     ("estimation/growth.py", "registered"): "the key of an estimator's answer",

@@ -23,7 +23,7 @@ TABLES = sa.MetaData(
 )
 # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
 NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
-ALERT_KINDS = "drift no_data clock unsure stale tracker picture many_moved many_silent"
+ALERT_KINDS = "drift no_data clock lens unsure stale tracker picture many_moved many_silent"
 OUTCOMES = "put_back accepted mended relearned false_alarm cleared camera_removed"
 ACTIVITY = (
     "camera.registered camera.changed camera.described camera.removed pose.agreed pose.accepted "

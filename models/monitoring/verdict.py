@@ -144,7 +144,7 @@ def judge(
     creep: Creep | None = None,
     *,
     enough: bool = True,
-    clock: bool = False,
+    scaled: bool = False,
 ) -> DriftVerdict:
     """The verdict on a window, given what had drifted before.
 
@@ -156,10 +156,11 @@ def judge(
     calm. Where nothing is identifiable, nothing changes.
 
     Of fewer than `enough` people since somebody said how the camera stands, the pose neither begins
-    nor ends a drift. A `clock` that is wrong before a camera that stands is one in height.
+    nor ends a drift. A clock or a lens that is wrong before a camera that stands is one in height,
+    what is seen being `scaled`.
     """
     crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
-    if not crept and clock and enough:
+    if not crept and scaled and enough:
         crept = ("height",)
     beyond = _beyond(drift, limits) if enough else {}
     if not drift.identifiable and chart is None and not crept and not beyond:

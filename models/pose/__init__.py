@@ -25,7 +25,7 @@ from models.pose.alarms import (
     since_alarm,
     without_creep,
 )
-from models.pose.clock import WrongClock
+from models.pose.causes import Cause, reason_of_causes
 from models.pose.config import FEWEST_BESIDE
 from models.pose.estimating import (
     PartialFailure,
@@ -89,7 +89,8 @@ __all__ = [
     "WalkConfig",
     "Walks",
     "WarmStart",
-    "WrongClock",
+    "Cause",
+    "reason_of_causes",
     "assume_site",
     "begin_creep_log",
     "count_walks",

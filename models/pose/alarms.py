@@ -22,6 +22,7 @@ from models.monitoring.creep import CreepLog, add_day, begin_log, posterior_mean
 from models.monitoring.group_scores import score_groups
 from models.monitoring.verdict import LIKELY
 from models.pose import config
+from models.pose.causes import cause_gains
 from models.pose.estimating import PoseFinding, pose_fit_of
 from models.pose.site import CameraSite
 from models.simulation.poses import PoseOffset, offset_trajectory
@@ -103,7 +104,10 @@ def since_alarm(
     fit = pose_fit_of(later, site)
     odds = math.exp(config.CHART_EVIDENCE * (chart.statistic - chart.level))
     prior = raised(found.moved_prior, odds)
-    since = replace(found, joint=fit.joint, fused=fit.fused, first=first, moved_prior=prior)
+    gains = cause_gains(later, site, fit.joint, fit.fused)
+    since = replace(
+        found, joint=fit.joint, fused=fit.fused, first=first, moved_prior=prior, gains=gains
+    )
     borne_out = since.posterior.moved >= LIKELY and not fit.fused.paths_differ
     return since if borne_out else found
 

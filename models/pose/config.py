@@ -82,7 +82,12 @@ LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25
 # and more with each walking group. Of 149 still windows the mean is 1.4 and 0.02: with less, some
 # of 300 groups are suspected; with twice as much, small moves are missed again.
 OTHER_HOURS, OTHER_HOURS_OF_A_GROUP = 1.5, 0.03
+# Other causes than a move, each as seldom as a move of the scale alone.
+CAUSE_SHARE, CAUSE_GAIN = 0.1, 2.0  # of changes; of the log likelihood: with less, none is asked
 CLOCK_SD = 0.15  # of the log of times, where a clock is wrong: 30 Hz taken for 25 are 0.18
+LENS_SD = 0.25  # of the log of the focal length, where a lens was zoomed
+CAUSE_NAMED = 0.9  # of a change that is certain: else it has the name of a move
+LENS_BY_SPEEDS = 0.8  # of what speeds gain by a clock they gain by a lens, where it is one
 # A picture beside the people.
 PICTURE_FREEDOM = 5.0  # of Student's t: light and leaves move matches beyond residuals
 PICTURE_WRONG = 1e-4  # of matches are of something else: `python -m studies pictures` counts them

@@ -15,8 +15,8 @@ from models.monitoring.verdict import Drift, pose_after
 from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
 from models.pose import config
+from models.pose.causes import Cause, CauseGains, cause_gains, likeliest_causes
 from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
-from models.pose.clock import WrongClock, wrong_clock
 from models.pose.fusion import fused_estimate
 from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
 from models.pose.picture import PictureEvidence, with_picture
@@ -51,7 +51,8 @@ class PoseFinding:
     change, None where there was none, and `first` the first that counts. `failures` are of what is
     beside. `warm_start` is where the next estimate may begin; None where it has to search all
     poses. `moved_prior` is how likely it was, before any track, that the camera has moved.
-    `picture` is what a picture says beside the people, where there is one that matched.
+    `picture` is what a picture says beside the people, where there is one that matched. `gains` are
+    what other causes than a move explain; None where nothing looks like one.
     """
 
     prior: CameraPose
@@ -63,6 +64,7 @@ class PoseFinding:
     warm_start: WarmStart | None = None
     moved_prior: float = config.MOVED_PRIOR
     picture: PictureEvidence | None = None
+    gains: CauseGains | None = None
 
     @cached_property
     def posterior(self) -> PosePosterior:
@@ -72,9 +74,12 @@ class PoseFinding:
         return people if self.picture is None else with_picture(people, self.picture, moved_prior)
 
     @cached_property
-    def clock(self) -> WrongClock | None:
-        """How likely the clock is wrong, where places say that the camera stands."""
-        return wrong_clock(self.joint, self.fused, self.posterior, self.moved_prior)
+    def causes(self) -> tuple[Cause, Cause] | None:
+        """How likely the clock is wrong, and how likely the lens is another; None of neither."""
+        if self.gains is None:
+            return None
+        groups = self.joint.walking_groups
+        return likeliest_causes(self.gains, self.posterior, groups, self.moved_prior)
 
     @cached_property
     def drift(self) -> Drift:
@@ -129,6 +134,7 @@ def estimate_pose(
         failures=tuple(failures),
         warm_start=None if failures else found.warm_start,
         picture=picture,
+        gains=cause_gains(found.tracks, site, found.fit.joint, found.fit.fused),
     )
 
 

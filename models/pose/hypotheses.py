@@ -48,7 +48,8 @@ class PosePosterior:
     """A mixture over hypotheses: weights (K,), means (K, 4) and covariances (K, 4, 4).
 
     Means are offsets of tilt, roll, log height and heading from the prior pose. By the first
-    hypothesis, none moved. Of those that are not `seen` (4,), the tracks say nothing. `pictured` is
+    hypothesis, none moved; `prior_squared` is its squared distance from what tracks say. Of those
+    parameters that are not `seen` (4,), they say nothing. `pictured` is
     whether a picture has had its say, and `site_changed` how likely people walk otherwise for other
     reasons than the camera: 0 without a picture (`models.pose.picture`).
 
@@ -63,6 +64,7 @@ class PosePosterior:
     seen: Mask
     pictured: bool = False
     site_changed: float = 0.0
+    prior_squared: float = 0.0
 
     @property
     def moved(self) -> float:
@@ -176,6 +178,7 @@ def pose_posterior(
         means=means,
         covariances=covariances,
         seen=seen,
+        prior_squared=float(squared[0]),
     )
 
 
@@ -274,8 +277,13 @@ def log_student(squared: Array, scales: Array, degrees: float) -> Array:
         gammaln((degrees + size) / 2)
         - gammaln(degrees / 2)
         - 0.5 * (size * math.log(degrees * math.pi) + log_determinants)
-        - (degrees + size) / 2 * np.log1p(squared / degrees)
+        - log_tail(squared, degrees, size)
     )
+
+
+def log_tail(squared: Any, degrees: float, size: int = len(PARAMETERS)) -> Any:
+    """How much less than at its middle the log density of such a t is at a squared distance."""
+    return (degrees + size) / 2 * np.log1p(squared / degrees)
 
 
 def _quantile(weights: Array, means: Array, sds: Array, share: float) -> float:

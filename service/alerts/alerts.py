@@ -128,13 +128,13 @@ def close_pose_alerts(
 ) -> None:
     """End the open alerts that measure a camera against its prior pose, if there are any.
 
-    A clock is neither put back nor accepted: its alert is mended with the pose.
+    Clock and lens are neither put back nor accepted: their alert is mended with the pose.
     """
     for kind in alerts.POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
-            clock = kind == AlertKind.CLOCK and outcome in (Outcome.PUT_BACK, Outcome.ACCEPTED)
-            close_alert(session, record, Outcome.MENDED if clock else outcome, note, by)
+            mended = outcome in (Outcome.PUT_BACK, Outcome.ACCEPTED) and kind in alerts.SCALE_KINDS
+            close_alert(session, record, Outcome.MENDED if mended else outcome, note, by)
 
 
 def close_alert(

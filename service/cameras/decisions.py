@@ -29,15 +29,16 @@ def accept_pose(
 
     Raises:
         NotFoundError: there is no such camera.
-        ConflictError: no pose has been estimated yet, or its height may be a wrong clock's.
+        ConflictError: no pose was estimated yet, or its height may be a wrong clock's or lens's.
     """
     view = view_pose(session, settings, decision.camera_id)
-    clock = alerts.firing(session, decision.camera_id, AlertKind.CLOCK)
-    if clock is not None:
-        raise ConflictError(
-            f"pose: its clock looks wrong, and a wrong clock looks like another height: end alert "
-            f"{clock.id} first, as mended or false_alarm"
-        )
+    for kind in alerts.SCALE_KINDS:
+        wrong = alerts.firing(session, decision.camera_id, kind)
+        if wrong is not None:
+            raise ConflictError(
+                f"pose: its {kind} looks wrong, and a wrong {kind} looks like another height: end "
+                f"alert {wrong.id} first, as mended or false_alarm"
+            )
     if not view.status.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
     held = held_pose(session, decision.camera_id)  # as long as the alert is open

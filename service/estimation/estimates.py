@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.verdict import Drift, pose_after
 from models.pose import PosePosterior, drift_of
-from models.reasons import Reason
+from models.reasons import Reason, TracksCode
 from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
 from service.degrees import in_degrees
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
@@ -21,7 +21,7 @@ from service.reasons import ServiceCode
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
 from service.store import estimates, journal, pictures, references
-from service.store.alerts import MOVED_KINDS
+from service.store.alerts import MOVED_KINDS, SCALE_KINDS
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
 from service.store.references import LastPoseRecord, SiteReferenceRecord
@@ -165,7 +165,7 @@ def update_alerts(
         end_alert(session, camera_id, before, Outcome.CLEARED, note=note)
     if kind is None or (moved and not drift.identifiable and not verdict.alarmed):
         return
-    clock = judgement.clock if moved else None
+    cause = judgement.cause if moved else None
     open_alert(
         session,
         settings,
@@ -174,7 +174,7 @@ def update_alerts(
         Severity.CRITICAL if moved and verdict.excess >= 2 else Severity.WARNING,
         identifiable_drift(drift),
         judgement.since if moved else None,
-        reasons=judgement.reasons if clock is None else (clock,),
+        reasons=judgement.reasons if cause is None else (cause,),
         changed_after=judgement.after if moved else None,
         # Zones are told of with a move alone.
         evidence=evidence if kind is AlertKind.DRIFT else {**evidence, "zones": None},
@@ -186,9 +186,12 @@ def _kind_of(judgement: Judgement, firing: set[AlertKind]) -> AlertKind | None:
     verdict = judgement.verdict
     if not verdict.drifting:
         return AlertKind.UNSURE if judgement.state == PoseState.UNSURE else None
-    # What was named a clock fault stays one until an angle has drifted too.
-    still_clock = AlertKind.CLOCK in firing and verdict.drifted == ("height",)
-    return AlertKind.CLOCK if judgement.clock is not None or still_clock else AlertKind.DRIFT
+    if judgement.cause is not None:
+        lens = judgement.cause.code == TracksCode.LENS_CHANGED
+        return AlertKind.LENS if lens else AlertKind.CLOCK
+    # What was named otherwise stays so until an angle has drifted too.
+    named = [kind for kind in SCALE_KINDS if kind in firing and verdict.drifted == ("height",)]
+    return named[0] if named else AlertKind.DRIFT
 
 
 def _record(

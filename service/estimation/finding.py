@@ -17,6 +17,7 @@ from models.pose import (
     CREEP_SHARE,
     AlarmRate,
     CameraSite,
+    Cause,
     ChartResult,
     Creep,
     FusedEstimate,
@@ -26,7 +27,6 @@ from models.pose import (
     PoseFinding,
     PosePosterior,
     WarmStart,
-    WrongClock,
     alarm_chart_result,
     assume_site,
     chart_from_bytes,
@@ -110,7 +110,7 @@ class Finding:
     what the anchor says of weeks; once the camera has crept, all else is by its first map, too.
     `picture` is the newest one; where it counts beside the tracks, `people_moved` is whether these
     alone say that the camera moved.
-    `clock` is how likely times are wrong before a camera that stands.
+    `causes` are how likely the clock or the lens is wrong before a camera that stands.
     `zones` are what the pose comes to for them, by the `tracks`.
     `pieces` says how many of the tracks are of others' walks, where these are many. `failures`
     names what should be there beside the served pose. `last` is where the next one may begin.
@@ -128,7 +128,7 @@ class Finding:
     change: SeenTrack | None
     picture: SeenPicture | None = None
     people_moved: bool | None = None
-    clock: WrongClock | None = None
+    causes: tuple[Cause, Cause] | None = None
     zones: MovedZones | None = None
     pieces: Reason | None = None
     failures: Reasons = ()
@@ -207,7 +207,7 @@ def compute_finding(
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
         picture=evidence.picture,
         people_moved=people_moved,
-        clock=found.clock if site.learned else None,
+        causes=found.causes,
         zones=moved,
         pieces=walks.reason,
         failures=tuple(failures.reasons),

@@ -1,6 +1,6 @@
-"""The judgement of a finding: has the camera moved, since when, and is it a clock.
+"""The judgement of a finding: has the camera moved, since when, and is it its clock or its lens.
 
-In steps: a wrong clock, the chart that counts, the verdict, the state, the times, the reasons.
+In steps: another cause, the chart that counts, the verdict, the state, the times, the reasons.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from models.monitoring.verdict import (
     reason_of_creep,
     reason_of_drift,
 )
-from models.pose import ChartResult, WindowState, is_site_changed, state_of
+from models.pose import ChartResult, WindowState, is_site_changed, reason_of_causes, state_of
 from models.reasons import Reason
 from service.enums import Answer, PoseState
 from service.estimation.evidence import Evidence
@@ -51,8 +51,8 @@ class History:
 class Judgement:
     """A camera's state by a finding, and `since` when, where it has moved.
 
-    `after` is when it last stood where it should, as far as is known. `clock` is why its clock or
-    frame rate looks wrong.
+    `after` is when it last stood where it should, as far as is known. `cause` is why its clock or
+    its lens looks wrong, instead of its pose.
     """
 
     state: PoseState
@@ -60,7 +60,7 @@ class Judgement:
     verdict: DriftVerdict = _UNJUDGED
     after: datetime | None = None
     since: datetime | None = None
-    clock: Reason | None = None
+    cause: Reason | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,9 +77,11 @@ class Case:
     def judged(self) -> Judgement:
         """The judgement."""
         finding, turned = self.finding, self.finding.posterior.turned
-        wrong = self._wrong_clock()
-        clock = wrong or clock_fault(self.drift, turned, self.evidence.prior, self.frame_rate_hz)
-        chart = self._counting_chart(clock)
+        wrong = self._other_cause()
+        cause = wrong
+        if finding.causes is None:
+            cause = clock_fault(self.drift, turned, self.evidence.prior, self.frame_rate_hz)
+        chart = self._counting_chart(cause)
         verdict = judge(
             self.drift,
             self.evidence.limits,
@@ -87,32 +89,34 @@ class Case:
             chart,
             finding.creep,
             enough=finding.enough or finding.posterior.pictured,
-            clock=wrong is not None,
+            scaled=wrong is not None,
         )
         state = self._state(verdict)
         after, since = self._moved_between(verdict, state)
-        reasons = self._reasons(verdict, clock)
-        if clock is None and chart is not None and verdict.alarmed:
-            clock = charted_clock(chart, turned)
+        reasons = self._reasons(verdict, cause)
+        if cause is None and chart is not None and verdict.alarmed:
+            cause = charted_clock(chart, turned)
         return Judgement(
-            state=state, reasons=reasons, verdict=verdict, after=after, since=since, clock=clock
+            state=state, reasons=reasons, verdict=verdict, after=after, since=since, cause=cause
         )
 
-    def _wrong_clock(self) -> Reason | None:
-        """The reason of a clock that is surely wrong before a camera that stands; None of none.
+    def _other_cause(self) -> Reason | None:
+        """The reason of a clock or a lens that is surely wrong before a camera that stands.
 
         One that was told lasts while it is likelier wrong than not.
         """
-        clock, told = self.finding.clock, self.history.drifted == ("height",)
+        told = self.history.drifted == ("height",)
         certainty = LIKELY if told else self.evidence.limits.certainty
-        return None if clock is None else clock.reason(certainty, self.frame_rate_hz)
+        finding = self.finding
+        moved = finding.posterior.moved
+        return reason_of_causes(finding.causes, moved, certainty, self.frame_rate_hz)
 
-    def _counting_chart(self, clock: Reason | None) -> ChartResult | None:
+    def _counting_chart(self, cause: Reason | None) -> ChartResult | None:
         """The drift chart's result, unless it is explained without a move."""
         chart = self.finding.reading
         if chart is None:
             return None
-        if clock is None and not self.history.drifted and may_be_clock(chart):
+        if cause is None and not self.history.drifted and may_be_clock(chart):
             return None
         if self.finding.posterior.pictured and self.drift.move.moved < LIKELY:
             return None  # people walk otherwise, before a camera that stands
@@ -161,7 +165,7 @@ class Case:
             return _between(stood_s, self.finding.tracks[0].ended_s)
         return _between(last.to_s, self.finding.tracks[-1].ended_s)
 
-    def _reasons(self, verdict: DriftVerdict, clock: Reason | None) -> Reasons:
+    def _reasons(self, verdict: DriftVerdict, cause: Reason | None) -> Reasons:
         """The reasons, those that matter most first."""
         finding, fused = self.finding, self.finding.fused
         otherwise = is_site_changed(finding.posterior, fused) and not verdict.drifting
@@ -171,10 +175,10 @@ class Case:
             fused.reason if fused.paths_changed else None,
             None if finding.creep is None else reason_of_creep(finding.creep),
             None
-            if clock is not None and verdict.excess < 1
+            if cause is not None and verdict.excess < 1
             else reason_of_drift(self.drift, verdict, self.evidence.limits),
             finding.picture.reason if finding.picture and finding.posterior.pictured else None,
-            clock,
+            cause,
             None if finding.reading is None else reason_of_chart(finding.reading),
             None if fused.paths_changed else fused.reason,
             None if plane else finding.joint.reason,

@@ -14,7 +14,7 @@ from service.degrees import in_degrees
 from service.enums import AlertKind, Outcome, PoseState
 from service.settings import Settings
 from service.store import alerts, fleet
-from service.store.alerts import AlertFilter, AlertRecord
+from service.store.alerts import SCALE_KINDS, AlertFilter, AlertRecord
 from service.wording.alerts import about_words, alert_line, done_words
 from service.wording.times import from_seconds
 
@@ -181,12 +181,12 @@ def _after_s(record: AlertRecord, at: datetime | None) -> float | None:
 
 
 def _by_section(found: Sequence[ReportedAlert]) -> dict[str, tuple[ReportedAlert, ...]]:
-    sections = {AlertKind.DRIFT: "moved", AlertKind.CLOCK: "clocks"}
+    sections = {AlertKind.DRIFT: "moved", **dict.fromkeys(SCALE_KINDS, "clocks")}
     parts: dict[str, list[ReportedAlert]] = defaultdict(list)
     for each in found:
         false = each.outcome == Outcome.FALSE_ALARM
         parts["false_alarms" if false else sections.get(each.kind, "others")].append(each)
-    return {name: tuple(parts[name]) for name in (*sections.values(), "others", "false_alarms")}
+    return {name: tuple(parts[name]) for name in ("moved", "clocks", "others", "false_alarms")}
 
 
 def _by_state(

@@ -112,7 +112,8 @@ class AlertRecord(Record):
         return self.silenced_until is not None and self.silenced_until > now
 
 
-MOVED_KINDS = (AlertKind.DRIFT, AlertKind.CLOCK)  # that say that a camera has moved, or its clock
+SCALE_KINDS = (AlertKind.CLOCK, AlertKind.LENS)  # that look like a move of a camera that stands
+MOVED_KINDS = (AlertKind.DRIFT, *SCALE_KINDS)
 POSE_KINDS = (*MOVED_KINDS, AlertKind.UNSURE)  # that hold a camera against its prior pose
 # What came of an alert, of what a person may say of its kind; the first is that it was real.
 _OF_POSE = (Answer.PUT_BACK, Answer.ACCEPTED, Answer.FALSE_ALARM)

@@ -48,6 +48,7 @@ ACTS: dict[Answer | Act, ActWords] = {
 CHOSEN_AS: dict[AlertKind | str, tuple[str, str]] = {
     AlertKind.DRIFT: (N_("moved"), N_("moved")),
     AlertKind.CLOCK: (N_("is a clock fault"), N_("are clock faults")),
+    AlertKind.LENS: (N_("has another lens"), N_("have other lenses")),
     AlertKind.UNSURE: (N_("is unsure"), N_("are unsure")),
     AlertKind.NO_DATA: (N_("is silent"), N_("are silent")),
     AlertKind.STALE: (N_("is not looked at"), N_("are not looked at")),

@@ -18,6 +18,7 @@ from service.wording.times import Clock, duration
 KINDS = {
     AlertKind.DRIFT: N_("The camera moved"),
     AlertKind.CLOCK: N_("The clock looks wrong"),
+    AlertKind.LENS: N_("The lens was changed"),
     AlertKind.UNSURE: N_("Something changed"),
     AlertKind.NO_DATA: N_("No people come"),
     AlertKind.STALE: N_("Its estimate fails or lacks tracks"),
@@ -30,6 +31,7 @@ KINDS = {
 BADGES = {
     AlertKind.DRIFT: N_("Moved"),
     AlertKind.CLOCK: N_("Clock"),
+    AlertKind.LENS: N_("Lens"),
     AlertKind.UNSURE: N_("Unsure"),
     AlertKind.NO_DATA: N_("No people"),
     AlertKind.STALE: N_("Not looked at"),
@@ -60,6 +62,10 @@ _ANSWERS = {
     AlertKind.UNSURE: _OF_POSE,
     AlertKind.CLOCK: {
         Answer.MENDED: N_("Clock and frame rate are as they should be; the next people tell."),
+        Answer.FALSE_ALARM: _NOTHING_WRONG,
+    },
+    AlertKind.LENS: {
+        Answer.MENDED: N_("Zoom and picture size are as they should be; the next people tell."),
         Answer.FALSE_ALARM: _NOTHING_WRONG,
     },
     AlertKind.NO_DATA: {
@@ -105,6 +111,7 @@ ONE_SOURCE_POSTS = N_("only one source posts")
 _TOLD_AS = {
     AlertKind.DRIFT: N_("it is told as drift now"),
     AlertKind.CLOCK: N_("it is told as clock now"),
+    AlertKind.LENS: N_("it is told as lens now"),
     AlertKind.UNSURE: N_("it is told as unsure now"),
 }
 # A test alert's description.
@@ -187,6 +194,8 @@ def alert_line(alert: AlertRecord) -> str:
     """What an alert tells of, in a line of a list."""
     if alert.kind == AlertKind.CLOCK:
         return _("people seem to walk too fast or too slowly: its clock or frame rate looks wrong")
+    if alert.kind == AlertKind.LENS:
+        return _("it shows another angle of view: zoomed, or its picture is cut otherwise")
     if alert.kind == AlertKind.UNSURE:
         return _("people walk on none of the learned paths: turned far, or they walk elsewhere")
     if alert.kind == AlertKind.DRIFT and (moved := offset_words(alert.drift)):
@@ -260,6 +269,12 @@ def why_words(alert: AlertRecord, estimate: EstimateRecord | None, clock: Clock)
                 "The last {n} people keep to their paths, but all of them seem to walk too fast or "
                 "too slowly. A clock or a frame rate does that by itself; a camera seldom rises "
                 "without turning.",
+                n=estimate.tracks,
+            )
+        if alert.kind == AlertKind.LENS:
+            return _(
+                "Where the last {n} people walk, and how fast, fits a camera that stands and shows "
+                "another angle of view, better than any that moved.",
                 n=estimate.tracks,
             )
         if alert.kind == AlertKind.UNSURE:

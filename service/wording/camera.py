@@ -8,7 +8,7 @@ from models.monitoring.verdict import Drift
 from models.reasons import Reason
 from service.enums import AlertKind, AlertState, PoseState, TrainingState
 from service.reasons import ServiceCode
-from service.store.alerts import MOVED_KINDS, AlertRecord
+from service.store.alerts import MOVED_KINDS, SCALE_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.wording.alerts import KINDS
 from service.wording.language import N_, _, _n, inner
@@ -16,10 +16,11 @@ from service.wording.moves import drift_words, moved_words, sure_words
 from service.wording.reasons import in_words
 from service.wording.times import Clock, duration
 
-# What a camera is shown as: its state, but for a wrong clock, which moves no camera.
+# What a camera is shown as: its state, but for a wrong clock or lens, which move no camera.
 STATES: dict[PoseState | AlertKind, str] = {
     PoseState.DRIFTING: N_("Moved"),
     AlertKind.CLOCK: N_("Clock"),
+    AlertKind.LENS: N_("Lens"),
     PoseState.UNSURE: N_("Unsure"),
     PoseState.SUSPECTED: N_("Maybe moved"),
     PoseState.NO_DATA: N_("No people"),
@@ -38,7 +39,7 @@ TRAININGS = {
 _FEW_HOURS = 6  # of date and time: fewer are a morning's people; of words alone
 # The alerts that a state speaks for; every other one is named.
 _SPOKEN_FOR = {
-    PoseState.DRIFTING: (AlertKind.DRIFT, AlertKind.CLOCK),
+    PoseState.DRIFTING: MOVED_KINDS,
     PoseState.UNSURE: (AlertKind.UNSURE,),
     PoseState.NO_DATA: (AlertKind.NO_DATA,),
 }
@@ -47,8 +48,8 @@ _SPOKEN_FOR = {
 def shown_as(state: PoseState, alerts: Sequence[AlertRecord]) -> PoseState | AlertKind:
     """The word of `STATES` for a camera in a state, of which some alerts fire."""
     kinds = {alert.kind for alert in alerts}
-    if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds and AlertKind.DRIFT not in kinds:
-        return AlertKind.CLOCK
+    if state == PoseState.DRIFTING and AlertKind.DRIFT not in kinds:
+        return next((kind for kind in SCALE_KINDS if kind in kinds), state)
     return state
 
 
@@ -135,6 +136,10 @@ def _alarmed(doubts: Sequence[AlertRecord]) -> str:
 def _moved(camera: CameraFacts, estimate: EstimateRecord, clock: Clock) -> str:
     since = "" if estimate.drift_since is None else clock.when(estimate.drift_since)
     sure = sure_words(estimate)
+    if any(alert.kind == AlertKind.LENS for alert in camera.alerts):
+        if since:
+            return _("The lens shows another angle of view since about {time}.", time=since)
+        return _("The lens shows another angle of view.")
     if any(alert.kind == AlertKind.CLOCK for alert in camera.alerts):
         how = moved_words(estimate)
         if since:
@@ -212,6 +217,8 @@ def fleet_line(
     """
     if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds:
         return _("people seem to walk too fast or too slowly: its clock or frame rate looks wrong")
+    if state == PoseState.DRIFTING and AlertKind.LENS in kinds:
+        return _("it shows another angle of view: zoomed, or its picture is cut otherwise")
     if kinds and kinds[0] == AlertKind.STALE:
         return _("its estimate fails or lacks tracks: the alert says why, and since when")
     if state == PoseState.UNCONNECTED:

@@ -21,6 +21,10 @@ WORDS = {
             "People seem to walk too fast or too slowly. A wrong clock or frame rate looks "
             "like that; the camera itself may well stand."
         ),
+        N_("Lens"): N_(
+            "It shows another angle of view: somebody zoomed, or its picture is cut or scaled "
+            "otherwise. The camera itself stands. Set it back, or say its new focal length."
+        ),
         N_("No people"): N_(
             "Nobody has come for longer than is usual there at such an hour. Camera, tracker "
             "or network may be down; or the place is closed."

@@ -147,6 +147,15 @@ def _scale_changed(v: _Values) -> str:
     )
 
 
+def _lens_changed(v: _Values) -> str:
+    return _(
+        "a focal length that differs by {percent:+.0f} % explains where people walk, and how fast, "
+        "better than any move: the lens was zoomed, or the picture is cut or scaled "
+        "otherwise",
+        percent=100 * (v["factor"] - 1),
+    )
+
+
 def _ambiguous(v: _Values) -> str:
     said = _(" and ").join(_("{turn:+.1f} deg", turn=turn) for turn in v["turns_deg"])
     return _("turns of {turns} explain where people walk about as well", turns=said)
@@ -272,6 +281,7 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     TracksCode.CHART: _chart,
     TracksCode.CREPT: _crept,
     TracksCode.SCALE_CHANGED: _scale_changed,
+    TracksCode.LENS_CHANGED: _lens_changed,
     TracksCode.PATHS_CHANGED: N_(
         "people walk on none of the paths that were learned: the camera was turned far, or they "
         "walk elsewhere"

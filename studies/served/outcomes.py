@@ -9,7 +9,7 @@ import numpy as np
 from models.errors import CalibrationError
 from models.geometry.pose import PARAMETERS, CameraPose, array_of
 from models.monitoring.verdict import clock_fault, judge
-from models.pose import CameraSite, DriftLimits, PoseFinding, state_of
+from models.pose import CameraSite, DriftLimits, PoseFinding, reason_of_causes, state_of
 from studies.protocol.cases import ProtocolCase, angle_deg
 from studies.served.windows import Window, looks
 
@@ -43,8 +43,8 @@ class ServedOutcome:
     and `failure` says why. `rotation_deg` is the whole rotation between the served and the true
     pose, `height_error` a share of the height. `cuts` windows were cut at a change, where there
     was none. `mapped` says whether the flow map had a part, `reason` what was said of it. `state`
-    is by the last look alone, without a chart, `moved` the probability that it moved, and `clock`
-    says that a drift would be told as one of the clock.
+    is by the last look alone, without a chart, `moved` the probability that it moved, and `cause`
+    the code of what a drift would be told as instead.
     """
 
     reference_tracks: int
@@ -60,7 +60,7 @@ class ServedOutcome:
     failure: str = ""
     state: str = ""
     moved: float | None = None
-    clock: bool = False
+    cause: str = ""
 
 
 def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> ServedOutcome:
@@ -79,9 +79,10 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
         return _unserved(case, failure, time.monotonic() - started)
     found, served = last.finding, last.finding.pose
     limits = DriftLimits()
-    wrong = None if found.clock is None else found.clock.reason(limits.certainty, None)
-    verdict = judge(found.drift, limits, (), clock=wrong is not None)
-    clock = wrong or clock_fault(found.drift, found.posterior.turned, case.prior_pose, None)
+    cause = reason_of_causes(found.causes, found.posterior.moved, limits.certainty, None)
+    verdict = judge(found.drift, limits, (), scaled=cause is not None)
+    if found.causes is None:
+        cause = clock_fault(found.drift, found.posterior.turned, case.prior_pose, None)
     return ServedOutcome(
         reference_tracks=len(case.reference),
         seen_tracks=len(case.seen),
@@ -100,7 +101,7 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
             mapped=site is not None and site.paths is not None,
         ),
         moved=found.posterior.moved,
-        clock=verdict.drifting and clock is not None,
+        cause="" if cause is None or not verdict.drifting else str(cause.code),
     )
 
 

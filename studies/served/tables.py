@@ -6,6 +6,7 @@ import numpy as np
 
 from models.pose import WindowState
 from models.pose.config import MOVED_PRIOR
+from models.reasons import TracksCode
 from studies.faults.catalogue import FAULTS
 from studies.lines_file import Heading
 from studies.pages import markers
@@ -231,21 +232,24 @@ def _name_table(cases: _Cases) -> str:
             right += said.count(name)
             told += sum(said.count(alert) for alert in _ALERTS)
         if name == "drift":
-            moved, other = moved + len(own), other + said.count("clock")
+            moved += len(own)
+            other += sum(said.count(name) for name in _CAUSES.values())
     words = (
         f"The right name in {right} of {told} that are told of and have one; "
-        f"the clock's in {other} of {moved} that moved."
+        f"the clock's or the lens's in {other} of {moved} that moved."
     )
     return f"**Names**, by the pose alone. {words}\n\n" + "\n".join(lines)
 
 
-_ALERTS = ("drift", "clock", "unsure")
+_CAUSES: dict[str, str] = {TracksCode.SCALE_CHANGED: "clock", TracksCode.LENS_CHANGED: "lens"}
+_ALERTS = ("drift", *_CAUSES.values(), "unsure")
 _NAMES = (*_ALERTS, "suspected", "ok", "learning")
 _NAMED = (Table.TIME, Table.FAR, Table.NAMES)
 _FAULTY = (Table.FAULTS, Table.NAMES)
 _RIGHT_NAMES = {
     "slow-clock-later": "clock",
     "fast-clock-later": "clock",
+    "zoom-later": "lens",
     "other-paths-later": "unsure",
 }
 
@@ -257,7 +261,7 @@ def _fault_name(fault: str) -> str:
 def _name(outcome: ServedOutcome) -> str:
     """The alert of an outcome, or the state without one."""
     if outcome.state == WindowState.DRIFTING:
-        return "clock" if outcome.clock else "drift"
+        return _CAUSES.get(outcome.cause, "drift")
     return outcome.state or WindowState.LEARNING
 
 

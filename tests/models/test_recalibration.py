@@ -21,6 +21,7 @@ from models.pose import (
     estimate_pose,
     learn_site,
     observe,
+    reason_of_causes,
     since_alarm,
 )
 from models.pose.change_point import find_change
@@ -272,12 +273,34 @@ def test_tracks_that_ended_together_are_in_order(site, tracks):
 
 def test_times_that_are_too_short_are_a_wrong_clock_and_no_move(tracks, site):
     fast = estimate_pose(seen([replace(t, time_s=0.8 * t.time_s) for t in tracks[1]]), site)
-    assert fast.clock.probability > 0.7
-    assert fast.clock.factor == pytest.approx(0.8, abs=0.04)
+    clock, lens = fast.causes
+    assert clock.probability > 0.7 > 0.1 > lens.probability
+    assert clock.factor == pytest.approx(0.8, abs=0.04)
     assert fast.posterior.moved < 0.1
-    assert fast.clock.reason(0.7, 30.0).code is TracksCode.SCALE_CHANGED
-    assert fast.clock.reason(0.99, 30.0) is None
-    for other in (tracks[1], tracks[2]):  # the camera stands, or moved: its clock is right
+    named = reason_of_causes(fast.causes, fast.posterior.moved, 0.7, 30.0)
+    assert named.code is TracksCode.SCALE_CHANGED
+    assert reason_of_causes(fast.causes, fast.posterior.moved, clock.probability + 1e-6, 1) is None
+
+
+@pytest.mark.parametrize("zoom", [0.8, 1.25])
+def test_a_lens_that_was_zoomed_is_no_move(tracks, site, zoom):
+    middle = np.array([LENS.cx, LENS.cy])
+    every = []
+    for track in tracks[1]:
+        uv = middle + zoom * (track.uv - middle)
+        inside = LENS.contains(uv)
+        if inside.sum() > 8:
+            every.append(replace(track, uv=uv[inside], time_s=track.time_s[inside]))
+    found = estimate_pose(seen(by_end(every)), site)
+    clock, lens = found.causes
+    assert lens.probability > 0.9 > 0.1 > clock.probability
+    assert lens.factor == pytest.approx(zoom, rel=0.05)
+    named = reason_of_causes(found.causes, found.posterior.moved, 0.9, None)
+    assert named.code is TracksCode.LENS_CHANGED
+
+
+def test_neither_clock_nor_lens_is_wrong_before_a_camera_that_stands_or_moved(tracks, site):
+    for other in (tracks[1], tracks[2]):
         found = estimate_pose(seen(other), site)
-        assert found.clock.probability < 0.05
-        assert found.clock.reason(0.9, 30.0) is None
+        assert found.causes is None or max(each.probability for each in found.causes) < 0.05
+        assert reason_of_causes(found.causes, found.posterior.moved, 0.9, 30.0) is None

@@ -101,7 +101,7 @@ def made_up(
     change=None,
     paths=False,
     changed=False,
-    clock=None,
+    causes=None,
 ) -> Finding:
     """What the tracks of a window come to: a pose, whose heading is identifiable by their `paths`.
 
@@ -145,7 +145,7 @@ def made_up(
         averaged=None,
         reading=None,
         creep=None,
-        clock=clock,
+        causes=causes,
         tracks=evidence.tracks,
         zones=zones_of(evidence, seen, fused, posterior),
         change=None if change is None else evidence.tracks[change],

@@ -110,11 +110,11 @@ class Street:
             self._see(0.4 * np.arange(-19, 1)[inside], uv[inside])
         self._post()
 
-    def keep_to_lanes(self, pose: CameraPose, count: int) -> None:
+    def keep_to_lanes(self, pose: CameraPose, count: int, *, lens: Intrinsics = LENS) -> None:
         """Post people of whom each walks one of three lanes, the same ones every time."""
         if not self._lanes:
             self._lanes = draw_lanes(LENS, PRIOR, LANES, np.random.default_rng(3))
-        for seen in walk_site(LENS, pose, self._lanes, LANES, count, self._next_rng()):
+        for seen in walk_site(lens, pose, self._lanes, LANES, count, self._next_rng()):
             self._see(seen.time_s - seen.time_s[-1], seen.uv)
         self._post()
 

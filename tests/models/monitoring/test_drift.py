@@ -205,9 +205,9 @@ def test_a_clock_fault_is_a_jump_in_scale_alone():
 
 def test_a_wrong_clock_is_told_before_a_camera_that_stands():
     stands = drift(move=likely(0.02))
-    told = judge(stands, LIMITS, (), clock=True)
+    told = judge(stands, LIMITS, (), scaled=True)
     assert (told.drifted, told.alarmed, told.drifting) == (("height",), True, True)
-    assert not judge(stands, LIMITS, (), clock=True, enough=False).drifting
+    assert not judge(stands, LIMITS, (), scaled=True, enough=False).drifting
     assert not judge(stands, LIMITS, told.drifted).drifting  # it was put right
 
 

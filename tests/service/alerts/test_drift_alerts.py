@@ -4,7 +4,7 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from models.pose import WrongClock
+from models.pose import Cause
 from service.store import references
 from service.training import begin_training, end_training
 from tests.service.bench import PRIOR, moved
@@ -141,18 +141,26 @@ def test_a_jump_in_scale_alone_is_named_a_clock_fault(bench):
     assert [alert["outcome"] for alert in bench.alerts()] == ["cleared"]
 
 
+def clock_of(probability, factor):
+    """The causes of a window: a clock so likely wrong, and a lens that is not."""
+    return (
+        Cause(probability=probability, factor=factor),
+        Cause(probability=0.01, factor=1.04),
+    )
+
+
 def test_a_wrong_clock_before_a_camera_that_stands_is_told_until_it_is_right(bench):
-    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.98, factor=1.2))
+    bench.see(PRIOR, paths=True, causes=clock_of(0.98, 1.2))
     assert bench.alerts() == []
-    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.995, factor=1.2))
+    bench.see(PRIOR, paths=True, causes=clock_of(0.995, 1.2))
     (alert,) = bench.alerts()
     assert (alert["kind"], alert["state"]) == ("clock", "firing")
     assert "as if 30 frames a second were taken for 25" in alert["reason"]
     assert bench.pose()["state"] == "drifting"
     assert "beyond" not in bench.pose()["reason"]
-    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.6, factor=1.15))
+    bench.see(PRIOR, paths=True, causes=clock_of(0.6, 1.15))
     assert len(bench.alerts(state="firing")) == 1
-    bench.see(PRIOR, paths=True, clock=WrongClock(probability=0.1, factor=1.02))
+    bench.see(PRIOR, paths=True, causes=clock_of(0.1, 1.02))
     assert [alert["outcome"] for alert in bench.alerts()] == ["cleared"]
 
 

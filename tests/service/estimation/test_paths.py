@@ -11,7 +11,7 @@ from service.estimation.evidence import load_evidence
 from service.estimation.finding import compute_finding
 from service.store import references
 from service.store.references import FlowMapRecord
-from tests.service.street import PRIOR, known_street
+from tests.service.street import LENS, PRIOR, known_street
 
 WANTED = 120
 
@@ -39,6 +39,27 @@ def judge_by(street, tracks):
 def tracks_of_map(street):
     with street.context.store.read() as session:
         return session.get(FlowMapRecord, references.newest(session, "corner").id).tracks
+
+
+def test_a_lens_that_was_zoomed_is_named_and_put_right(street):
+    zoomed = replace(LENS, fx=1.2 * LENS.fx, fy=1.2 * LENS.fy)
+    street.keep_to_lanes(PRIOR, 60)
+    street.look()
+    street.keep_to_lanes(PRIOR, 80, lens=zoomed)
+    body = street.look()
+    (alert,) = street.alerts(state="firing")
+    assert (body["state"], alert["kind"]) == ("drifting", "lens")
+    assert "focal length that differs by +2" in alert["reason"]
+    refused = street.http.post("/cameras/corner/pose/accept")
+    assert refused.status_code == 409
+    assert "its lens looks wrong" in refused.json()["detail"]
+    page = street.http.get("/ui/cameras/corner").text
+    assert "The lens shows another angle of view" in page
+    assert "Keep the new aim" not in page
+    resolve = f"/alerts/{alert['id']}/resolve"
+    street.http.post(resolve, json={"outcome": "mended"}).raise_for_status()
+    street.keep_to_lanes(PRIOR, 60)
+    assert (street.look()["state"], street.alerts(state="firing")) == ("ok", [])
 
 
 def test_the_window_begins_where_the_camera_turned(street):

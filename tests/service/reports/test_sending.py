@@ -146,7 +146,7 @@ def test_a_mail_says_what_the_report_says(settings):
         "Moved (1)",
         "- Corner 1: tilt +3.0°, since Tue 24 Mar, 10:40; put back by Ada after 3 hours",
         "",
-        "Clocks (1)",
+        "Clocks and lenses (1)",
         "- Corner 1: people seem to walk too fast or too slowly: its clock or frame rate looks "
         "wrong, since Fri 20 Mar, 09:00; put right by Bo after 4 days",
         "",

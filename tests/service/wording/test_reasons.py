@@ -64,6 +64,9 @@ SAID = [
     (T.SCALE_CHANGED, {"factor": 1.2, "rate_hz": 25.0},
      "the scale has changed by +20 % and the angles have not: as if 30 frames a second were taken "
      "for 25, or the camera was raised"),
+    (T.LENS_CHANGED, {"factor": 1.15},
+     "a focal length that differs by +15 % explains where people walk, and how fast, better than "
+     "any move: the lens was zoomed, or the picture is cut or scaled otherwise"),
     (T.SCALE_CHANGED, {"factor": 0.8, "rate_hz": 25.0},
      "the scale has changed by -20 % and the angles have not: as if 20 frames a second were taken "
      "for 25, or the camera was lowered"),

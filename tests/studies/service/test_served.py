@@ -140,7 +140,7 @@ def test_names_are_counted_beside_the_right_ones(tmp_path):
     kept = OutcomeFile(tmp_path / "p.jsonl")
     slow = replace(CASE, table=Table.NAMES, fault="slow-clock-later")
     told = replace(SERVED, state="drifting", moved=0.99)
-    clock = replace(told, clock=True)
+    clock = replace(told, cause="scale_changed")
     rows = [
         CaseResult(case_id=replace(CASE, knock="tilt-alone"), outcome=told),
         CaseResult(case_id=replace(CASE, knock="tilt-alone", seed=1), outcome=clock),
@@ -150,11 +150,15 @@ def test_names_are_counted_beside_the_right_ones(tmp_path):
         CaseResult(case_id=replace(slow, fault="zoom-later"), outcome=told),
     ]
     said = all_tables(kept.heading, rows)
-    assert "| tilt alone | 2 | drift | 1 | 1 | 0 | 0 | 0 | 0 |" in said
-    assert "| pan, far | 1 | drift | 1 | 0 | 0 | 0 | 0 | 0 |" in said
-    assert "after the reference) | 2 | clock | 0 | 1 | 0 | 1 | 0 | 0 |" in said
-    assert "| zoom-later (by 15 %, after the reference) | 1 | - | 1 | 0 | 0 | 0 | 0 | 0 |" in said
-    assert "The right name in 3 of 4 that are told of and have one; the clock's in 1 of 3" in said
+    assert "| tilt alone | 2 | drift | 1 | 1 | 0 | 0 | 0 | 0 | 0 |" in said
+    assert "| pan, far | 1 | drift | 1 | 0 | 0 | 0 | 0 | 0 | 0 |" in said
+    assert "after the reference) | 2 | clock | 0 | 1 | 0 | 0 | 1 | 0 | 0 |" in said
+    assert (
+        "| zoom-later (by 15 %, after the reference) | 1 | lens | 1 | 0 | 0 | 0 | 0 | 0 | 0 |"
+        in said
+    )
+    assert "The right name in 3 of 5 that are told of and have one" in said
+    assert "the clock's or the lens's in 1 of 3 that moved" in said
 
 
 def test_tables_are_put_between_the_markers_of_a_page(tmp_path):
