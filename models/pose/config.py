@@ -86,6 +86,7 @@ OTHER_HOURS, OTHER_HOURS_OF_A_GROUP = 1.5, 0.03
 CAUSE_SHARE, CAUSE_GAIN = 0.1, 2.0  # of changes; of the log likelihood: with less, none is asked
 CLOCK_SD = 0.15  # of the log of times, where a clock is wrong: 30 Hz taken for 25 are 0.18
 LENS_SD = 0.25  # of the log of the focal length, where a lens was zoomed
+CAUSE_MOVED = 0.1  # likely moved: of less, causes are asked with each full search alone
 CAUSE_NAMED = 0.9  # of a change that is certain: else it has the name of a move
 LENS_BY_SPEEDS = 0.8  # of what speeds gain by a clock they gain by a lens, where it is one
 # A picture beside the people.

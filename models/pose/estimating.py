@@ -75,8 +75,11 @@ class PoseFinding:
 
     @cached_property
     def causes(self) -> tuple[Cause, Cause] | None:
-        """How likely the clock is wrong, and how likely the lens is another; None of neither."""
-        if self.gains is None:
+        """How likely the clock is wrong, and how likely the lens is another; None of neither.
+
+        A picture knows better than people whether the camera stands, by the same lens.
+        """
+        if self.gains is None or self.posterior.pictured:
             return None
         groups = self.joint.walking_groups
         return likeliest_causes(self.gains, self.posterior, groups, self.moved_prior)
@@ -98,6 +101,7 @@ def estimate_pose(
     warm_start: WarmStart | None = None,
     *,
     picture: PictureEvidence | None = None,
+    told: bool = False,
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
 
@@ -106,7 +110,8 @@ def estimate_pose(
 
     `warm_start` is of the finding of almost the same tracks at the same site: where nothing speaks
     against it, its pose is refined, which takes a quarter to a half of the time and comes to the
-    same.
+    same. Other causes than a move are asked for where all poses were searched, where a move is not
+    unlikely, and where a change was `told` before.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -125,7 +130,7 @@ def estimate_pose(
     if found is None:
         site = replace(site, paths=None)
         found = search_change(tracks, site, None if failures else _at_site(warm_start, site))
-    return PoseFinding(
+    finding = PoseFinding(
         prior=prior,
         joint=found.fit.joint,
         fused=found.fit.fused,
@@ -134,8 +139,11 @@ def estimate_pose(
         failures=tuple(failures),
         warm_start=None if failures else found.warm_start,
         picture=picture,
-        gains=cause_gains(found.tracks, site, found.fit.joint, found.fit.fused),
     )
+    refined = warm_start is not None and found.searched_before(warm_start)
+    if refined and not told and finding.posterior.moved < config.CAUSE_MOVED:
+        return finding
+    return replace(finding, gains=cause_gains(found.tracks, site, finding.joint, finding.fused))
 
 
 def _at_site(warm_start: WarmStart | None, site: CameraSite) -> WarmStart | None:
@@ -173,6 +181,12 @@ class ChangeSearch:
     tracks: Observations
     fit: PoseFit
     warm_start: WarmStart | None = None
+
+    def searched_before(self, begun: WarmStart) -> bool:
+        """True if all that was done is to refine the pose that it began at."""
+        return self.warm_start is not None and (
+            self.warm_start.search.ended_s is begun.search.ended_s
+        )
 
 
 def pose_fit_of(

@@ -108,12 +108,6 @@ def open_alert(
     return record
 
 
-def fired_by_estimate(session: Session, camera_id: str) -> set[AlertKind]:
-    """The kinds of a camera's open alerts that its estimates stand behind."""
-    found = (alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
-    return {record.kind for record in found if record and record.source == AlertSource.ESTIMATE}
-
-
 def end_alert(
     session: Session, camera_id: str, kind: AlertKind, outcome: Outcome, note: str | None = None
 ) -> None:

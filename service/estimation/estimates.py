@@ -9,7 +9,7 @@ from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
 from models.monitoring.verdict import Drift, pose_after
 from models.pose import PosePosterior, drift_of
 from models.reasons import Reason, TracksCode
-from service.alerts.alerts import end_alert, fired_by_estimate, open_alert
+from service.alerts.alerts import end_alert, open_alert
 from service.degrees import in_degrees
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
 from service.estimation.alert_evidence import alert_evidence, rivals_of, would_notice
@@ -20,7 +20,7 @@ from service.job_queue import JobQueue
 from service.reasons import ServiceCode
 from service.references import is_before, made_against, window_of
 from service.settings import Settings
-from service.store import estimates, journal, pictures, references
+from service.store import alerts, estimates, journal, pictures, references
 from service.store.alerts import MOVED_KINDS, SCALE_KINDS
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
@@ -139,7 +139,7 @@ def history_of(session: Session, reference: SiteReferenceRecord) -> History:
     last = estimates.newest(session, camera_id)
     if last is not None and not made_against(reference, last):
         last = None
-    firing = fired_by_estimate(session, camera_id)
+    firing = alerts.firing_by_estimates(session, camera_id)
     unsure = AlertKind.UNSURE in firing
     if not firing & set(MOVED_KINDS):
         return History(last=last, drifted=(), unsure=unsure)
@@ -158,7 +158,7 @@ def update_alerts(
     evidence: dict[str, Any],
 ) -> None:
     """Open, update or end the alerts that an estimate stands behind: one of them fires, or none."""
-    firing, verdict = fired_by_estimate(session, camera_id), judgement.verdict
+    firing, verdict = alerts.firing_by_estimates(session, camera_id), judgement.verdict
     kind, moved = _kind_of(judgement, firing), verdict.drifting
     note = fired_as(kind) if kind is not None and moved else None
     for before in firing - {kind}:

@@ -15,7 +15,6 @@ from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
-from service.alerts.alerts import fired_by_estimate
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
@@ -226,7 +225,7 @@ def load_evidence(
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records, picture):
         return None
     drawn = zones.of_camera(session, camera_id)
-    told = drawn is not None and not fired_by_estimate(session, camera_id).isdisjoint(MOVED_KINDS)
+    told = not alerts.firing_by_estimates(session, camera_id).isdisjoint(MOVED_KINDS)
     kept = session.get(FlowMapRecord, reference.id)
     answered_at = alerts.answered_at(session, camera_id)
     seen = [

@@ -169,7 +169,8 @@ def compute_finding(
     reading = _read(evidence, observed, site, 0, failures)
     suspicious = reading is not None and reading.suspicious
     basis = basis_of(evidence, crept=crept, suspicious=suspicious)
-    found = estimate_pose(observed, site, begin_of(evidence.last, basis))
+    begin = begin_of(evidence.last, basis)
+    found = estimate_pose(observed, site, begin, told=evidence.told)
     failures.take(found.failures)
     if found.first:
         reading = _read(evidence, observed, site, found.first, failures)

@@ -135,6 +135,13 @@ _FIRING = select(AlertRecord).where(
     AlertRecord.state == AlertState.FIRING,
 )
 
+_BY_ESTIMATES = select(AlertRecord.kind).where(
+    AlertRecord.camera_id == bindparam("camera"),
+    AlertRecord.kind.in_(POSE_KINDS),
+    AlertRecord.state == AlertState.FIRING,
+    AlertRecord.source == AlertSource.ESTIMATE,
+)
+
 
 def answers_of(kind: AlertKind) -> tuple[Answer, ...]:
     """What a person may say came of an alert: of a clock or a tracker no pose can be accepted."""
@@ -166,6 +173,11 @@ class AlertFilter:
 def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert of a camera and kind, or None."""
     return session.scalars(_FIRING, {"camera": camera_id, "kind": kind}).first()
+
+
+def firing_by_estimates(session: Session, camera_id: str) -> set[AlertKind]:
+    """The kinds of a camera's open alerts that its estimates stand behind."""
+    return set(session.scalars(_BY_ESTIMATES, {"camera": camera_id}))
 
 
 def firing_codes(session: Session, kind: AlertKind) -> dict[str, str | None]:
