@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.geometry.intrinsics import Intrinsics
+from models.geometry.intrinsics import Intrinsics, Projection
 from models.geometry.pose import array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import CLOCK
@@ -35,6 +35,7 @@ from models.walking.speed_reference import channels_of
 _STEP = 0.04  # of the log of a factor
 CLOCK_LOGS: Array = _STEP * np.arange(-10.0, 11.0)
 LENS_LOGS: Array = _STEP * np.arange(-15.0, 16.0)
+_NEVER = -1e6  # a gain
 _FIRST = 0.06  # asked first, both ways: where neither gains, nothing is wrong
 
 
@@ -66,7 +67,10 @@ class CauseGains:
 def cause_gains(
     tracks: Observations, site: CameraSite, joint: JointEstimate, fused: FusedEstimate
 ) -> CauseGains | None:
-    """The gains of a window; None where nothing seems wrong, or too little is known to tell."""
+    """The gains of a window; None where nothing seems wrong, or too little is known to tell.
+
+    A fisheye is asked for its clock alone: another focal length bends its rays otherwise.
+    """
     paths = site.paths
     if paths is None or fused.paths_changed or joint.walking_groups < FEWEST_GROUPS:
         return None
@@ -79,6 +83,8 @@ def cause_gains(
         return _speeds(replace(tracks, steps=steps), site, prior) - speeds
 
     def lens(log: float) -> tuple[float, float]:
+        if site.intrinsics.projection == Projection.FISHEYE:
+            return _NEVER, 0.0
         zoom = math.exp(log)
         seen = replace(walkers, steps=_zoomed_steps(walkers.steps, zoom))
         lens = replace(site.intrinsics, fx=site.intrinsics.fx * zoom, fy=site.intrinsics.fy * zoom)
@@ -190,7 +196,7 @@ def _occam(gains: Array, logs: Array, sd: float) -> float:
 
 def _against(*log_odds: float) -> float:
     """The probability of what has such log odds against each of some others."""
-    return 1 / (1 + sum(math.exp(min(-each, 700.0)) for each in log_odds))
+    return 1 / (1 + sum(math.exp(min(max(-each, -700.0), 700.0)) for each in log_odds))
 
 
 def _speeds(tracks: Observations, site: CameraSite, candidate: Array) -> float:

@@ -143,7 +143,9 @@ def estimate_pose(
     refined = warm_start is not None and found.searched_before(warm_start)
     if refined and not told and finding.posterior.moved < config.CAUSE_MOVED:
         return finding
-    return replace(finding, gains=cause_gains(found.tracks, site, finding.joint, finding.fused))
+    ask = partial(cause_gains, found.tracks, site, finding.joint, finding.fused)
+    gains = unless_failed(failures, "causes", ask)
+    return replace(finding, gains=gains, failures=tuple(failures))
 
 
 def _at_site(warm_start: WarmStart | None, site: CameraSite) -> WarmStart | None:

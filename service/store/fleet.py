@@ -108,12 +108,12 @@ def newest_identifiable_estimates(
 _E, _R = EstimateRecord, SiteReferenceRecord
 _LEAN: tuple[Any, Any] = (
     Bundle(
-        "reference",
+        _R.__tablename__,
         *(_R.id, _R.camera_id, _R.source, _R.origin, _R.from_s, _R.to_s, _R.window_from_s),
         *(_R.answer, _R.answered_at, _R.created_at, _R.ready_at),
     ),
     Bundle(
-        "estimate",
+        _E.__tablename__,
         *(_E.id, _E.reference_id, _E.state, _E.identifiable),
         *(_E.drift_since, _E.to_s, _E.created_at),
     ),

@@ -164,8 +164,9 @@ def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
     page.keyboard.type("nor")
     assert shown(page) == ["North door", "North stairs"]
     assert page.locator("#found").inner_text() == "2 cameras"
-    # the chips of moved, clock, unsure, maybe moved, no people, uncalibrated, unconnected, learning
-    for _ in range(8):
+    # the chips of moved, clock, lens, unsure, maybe moved, no people, uncalibrated, unconnected,
+    # learning
+    for _ in range(9):
         page.keyboard.press("Tab")
     page.keyboard.press("Space")
     assert shown(page) == ["North door"]

@@ -24,6 +24,7 @@ from models.pose import (
     reason_of_causes,
     since_alarm,
 )
+from models.pose.causes import CLOCK_LOGS, LENS_LOGS, CauseGains, likeliest_causes
 from models.pose.change_point import find_change
 from models.pose.estimating import pose_fit_of
 from models.pose.pose_fit import by_speeds_alone
@@ -297,6 +298,30 @@ def test_a_lens_that_was_zoomed_is_no_move(tracks, site, zoom):
     assert lens.factor == pytest.approx(zoom, rel=0.05)
     named = reason_of_causes(found.causes, found.posterior.moved, 0.9, None)
     assert named.code is TracksCode.LENS_CHANGED
+
+
+def test_a_fisheye_is_asked_for_its_clock_alone(tracks, site):
+    bent = replace(site, intrinsics=replace(LENS, distortion=(), projection="fisheye"))
+    slow = seen([replace(t, time_s=1.25 * t.time_s) for t in tracks[1]])
+    gains = estimate_pose(slow, bent).gains
+    posterior = estimate_pose(slow, site).posterior
+    clock, lens = likeliest_causes(gains, posterior, 60, 0.2)
+    assert lens.probability < 1e-9
+    assert clock.factor == pytest.approx(1.25, abs=0.06)
+
+
+def test_gains_of_thousands_are_certain_and_overflow_nothing(tracks, site):
+    found = estimate_pose(seen(tracks[2]), site)
+    for worth in (1e-3, 1e5):
+        gains = CauseGains(
+            clock=-worth * np.abs(CLOCK_LOGS - 0.2),
+            lens_speeds=-worth * np.abs(LENS_LOGS),
+            lens_places=-worth * np.abs(LENS_LOGS),
+            pose=worth,
+        )
+        assert all(
+            0 <= each.probability < 1 for each in likeliest_causes(gains, found.posterior, 400, 0.2)
+        )
 
 
 def test_neither_clock_nor_lens_is_wrong_before_a_camera_that_stands_or_moved(tracks, site):
