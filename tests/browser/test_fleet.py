@@ -34,6 +34,19 @@ def shown(page):
     return page.locator("li.row:not([hidden]) .who a").all_text_contents()
 
 
+@pytest.mark.parametrize("width", [390, 1280])
+def test_a_row_that_is_read_aloud_says_what_its_times_are(page, fleet, width):
+    fleet.add("alpha", "Alpha")
+    page.set_viewport_size({"width": width, "height": 844})
+    page.goto("/")
+    read = page.locator("#row-alpha").aria_snapshot()
+    assert "Steady" in read
+    assert "since" in read
+    assert "last person" in read
+    overflow = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+    assert overflow <= 0
+
+
 def test_an_alert_comes_up_by_itself(page, fleet, server):
     for name in ("Alpha", "Beta", "Gamma"):
         fleet.add(name.lower(), name)
