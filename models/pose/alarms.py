@@ -104,12 +104,10 @@ def since_alarm(
     fit = pose_fit_of(later, site)
     odds = math.exp(config.CHART_EVIDENCE * (chart.statistic - chart.level))
     prior = raised(found.moved_prior, odds)
-    gains = cause_gains(later, site, fit.joint, fit.fused)
-    since = replace(
-        found, joint=fit.joint, fused=fit.fused, first=first, moved_prior=prior, gains=gains
-    )
-    borne_out = since.posterior.moved >= LIKELY and not fit.fused.paths_differ
-    return since if borne_out else found
+    since = replace(found, joint=fit.joint, fused=fit.fused, first=first, moved_prior=prior)
+    if since.posterior.moved < LIKELY or fit.fused.paths_differ:
+        return found
+    return replace(since, gains=cause_gains(later, site, fit.joint, fit.fused))
 
 
 def raised(probability: float, odds: float) -> float:

@@ -22,7 +22,7 @@ from models.monitoring.verdict import reason_of_scale
 from models.paths.likelihood import Walkers, walkers_of
 from models.paths.reference import PathReference
 from models.pose import config
-from models.pose.hypotheses import PosePosterior, degrees_of_freedom, log_tail
+from models.pose.hypotheses import PosePosterior, degrees_of_freedom, log_tail, times_chance
 from models.pose.pose_fit import FusedEstimate
 from models.pose.site import CameraSite
 from models.reasons import Reason, TracksCode
@@ -115,13 +115,13 @@ def likeliest_causes(
     zoom can make up for that: what places say for one counts no more than what speeds do, and
     where speeds alone are better explained by a clock, it is none.
     """
-    by_hour = config.OTHER_HOURS + config.OTHER_HOURS_OF_A_GROUP * walking_groups
+    by_hour = times_chance(walking_groups)
     degrees = degrees_of_freedom(walking_groups)
 
     def evidence(gain: float) -> float:
         return math.copysign(log_tail(2 * abs(gain) / by_hour, degrees), gain)
 
-    odds = math.log(config.CAUSE_SHARE * moved_prior / (1 - moved_prior))
+    odds = math.log(config.SCALE_SHARE * moved_prior / (1 - moved_prior))
     stands = float(posterior.weights[0])
     moved = math.log(max(1 - stands, 1e-300) / max(stands, 1e-300))
     moved -= log_tail(posterior.prior_squared, degrees)

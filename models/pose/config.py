@@ -83,7 +83,7 @@ LEAST_FREEDOM, FREEDOM_OF_A_GROUP = 4.0, 0.25
 # of 300 groups are suspected; with twice as much, small moves are missed again.
 OTHER_HOURS, OTHER_HOURS_OF_A_GROUP = 1.5, 0.03
 # Other causes than a move, each as seldom as a move of the scale alone.
-CAUSE_SHARE, CAUSE_GAIN = 0.1, 2.0  # of changes; of the log likelihood: with less, none is asked
+CAUSE_GAIN = 2.0  # of the log likelihood: with less, none is asked
 CLOCK_SD = 0.15  # of the log of times, where a clock is wrong: 30 Hz taken for 25 are 0.18
 LENS_SD = 0.25  # of the log of the focal length, where a lens was zoomed
 CAUSE_MOVED = 0.1  # likely moved: of less, causes are asked with each full search alone

@@ -265,8 +265,12 @@ def _at_prior(squared: float, prior_gap: float, walking_groups: int) -> float:
     if not math.isfinite(prior_gap):
         return squared
     gap = max(prior_gap, 0.0)
-    by_hour = config.OTHER_HOURS + config.OTHER_HOURS_OF_A_GROUP * walking_groups
-    return min(max(squared, gap / by_hour), gap)
+    return min(max(squared, gap / times_chance(walking_groups)), gap)
+
+
+def times_chance(walking_groups: int) -> float:
+    """Times chance, that people of other hours lose at the true pose in the log posterior."""
+    return config.OTHER_HOURS + config.OTHER_HOURS_OF_A_GROUP * walking_groups
 
 
 def log_student(squared: Array, scales: Array, degrees: float) -> Array:

@@ -65,11 +65,17 @@ def _thinned(run: Array) -> Array:
     Source: Douglas and Peucker, "Algorithms for the Reduction of the Number of Points Required to
     Represent a Digitized Line", 1973.
     """
-    chord, between = run[-1] - run[0], run[1:-1] - run[0]
-    length = float(np.hypot(*chord))
-    across = between[:, 0] * chord[1] - between[:, 1] * chord[0]
-    off = np.abs(across) / length if length else np.hypot(*between.T)
-    if len(run) < 3 or off.max() <= _STRAIGHT_PX:
-        return run[[0, -1]]
-    farthest = int(off.argmax()) + 1
-    return np.concatenate([_thinned(run[: farthest + 1])[:-1], _thinned(run[farthest:])])
+    kept = np.zeros(len(run), bool)
+    kept[[0, -1]] = True
+    spans = [(0, len(run) - 1)]
+    while spans:  # no recursion: a zigzag that grows is as deep as it is long
+        first, last = spans.pop()
+        chord, between = run[last] - run[first], run[first + 1 : last] - run[first]
+        length = float(np.hypot(*chord))
+        across = between[:, 0] * chord[1] - between[:, 1] * chord[0]
+        off = np.abs(across) / length if length else np.hypot(*between.T)
+        if last - first > 1 and off.max() > _STRAIGHT_PX:
+            farthest = first + 1 + int(off.argmax())
+            kept[farthest] = True
+            spans += [(first, farthest), (farthest, last)]
+    return run[kept]

@@ -42,6 +42,13 @@ def test_the_horizon_is_drawn_where_it_is():
     assert horizon_path(LENS, posed(40.0)) == ""
 
 
+def test_a_zigzag_that_grows_for_thousands_of_points_is_drawn():
+    n = np.arange(3000.0)
+    zigzag = np.stack([0.001 * n, 1 + 0.001 * n * (-1) ** n], axis=1)[:, ::-1]
+    frame = Frame(left=-10, top=-10, right=10, bottom=10)
+    assert len(points(path_data([zigzag], frame))) > 2000
+
+
 def test_a_bent_horizon_has_more_points():
     drawn = points(horizon_path(BENT, posed(10.0)))
     assert len(drawn) > 5
