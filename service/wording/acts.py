@@ -9,40 +9,78 @@ from service.wording.language import N_
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActWords:
-    """An act on a button for `one` and for `many`, and before what it was `done` with."""
+    """An act on a button for `one` and `many`, before what it was `done` with, and its sense."""
 
     one: str
     many: str
     done: str
+    means: str
 
 
 ACTS: dict[Answer | Act, ActWords] = {
     Answer.PUT_BACK: ActWords(
-        one=N_("It was put back"), many=N_("They were put back"), done=N_("Put back")
+        one=N_("It was put back"),
+        many=N_("They were put back"),
+        done=N_("Put back"),
+        means=N_("The camera was turned to where it had been. What was learned stays."),
     ),
     Answer.ACCEPTED: ActWords(
-        one=N_("Keep the new aim"), many=N_("Keep the new aims"), done=N_("New aim kept")
+        one=N_("Keep the new aim"),
+        many=N_("Keep the new aims"),
+        done=N_("New aim kept"),
+        means=N_("Where it looks now is right. That is learned anew."),
     ),
     Answer.MENDED: ActWords(
-        one=N_("It was put right"), many=N_("They were put right"), done=N_("Put right")
+        one=N_("It was put right"),
+        many=N_("They were put right"),
+        done=N_("Put right"),
+        means=N_("Clock, tracker or view is as it should be. The next people tell."),
     ),
     Answer.FALSE_ALARM: ActWords(
-        one=N_("False alarm"), many=N_("False alarms"), done=N_("False alarm")
+        one=N_("False alarm"),
+        many=N_("False alarms"),
+        done=N_("False alarm"),
+        means=N_("Nothing was wrong. The next people tell."),
     ),
     Act.ACKNOWLEDGE: ActWords(
-        one=N_("Acknowledge"), many=N_("Acknowledge"), done=N_("Acknowledged")
+        one=N_("Acknowledge"),
+        many=N_("Acknowledge"),
+        done=N_("Acknowledged"),
+        means=N_("Tell the others that you look after it. The alert stays open."),
     ),
-    Act.SILENCE: ActWords(one=N_("Silence…"), many=N_("Silence…"), done=N_("Silenced")),
+    Act.SILENCE: ActWords(
+        one=N_("Silence…"),
+        many=N_("Silence…"),
+        done=N_("Silenced"),
+        means=N_("Nobody is woken by the alert until then. It stays open."),
+    ),
     Act.MAINTENANCE: ActWords(
-        one=N_("Plan maintenance…"), many=N_("Plan maintenance…"), done=N_("Maintenance planned")
+        one=N_("Plan maintenance…"),
+        many=N_("Plan maintenance…"),
+        done=N_("Maintenance planned"),
+        means=N_("Somebody is at the camera: nothing is judged or learned until they left."),
     ),
     Act.RESET: ActWords(
         one=N_("Learn anew at the old aim"),
         many=N_("Learn anew at the old aims"),
         done=N_("Being learned anew"),
+        means=N_("The camera stands, but other people walk there now, or elsewhere."),
     ),
-    Act.TAG: ActWords(one=N_("Tag…"), many=N_("Tag…"), done=N_("Tagged")),
-    Act.UNDO: ActWords(one=N_("Undo"), many=N_("Undo"), done=N_("Undone")),
+    Act.TAG: ActWords(
+        one=N_("Tag…"),
+        many=N_("Tag…"),
+        done=N_("Tagged"),
+        means=N_(
+            "Where a camera belongs, such as campus/north/gate, and words by which you find it, "
+            "such as outdoor."
+        ),
+    ),
+    Act.UNDO: ActWords(
+        one=N_("Undo"),
+        many=N_("Undo"),
+        done=N_("Undone"),
+        means=N_("Take back what was last said of the camera, if that is not long ago."),
+    ),
 }
 # After "1 of 5" and "2 of 5": what those are that do not take what the others take.
 CHOSEN_AS: dict[AlertKind | str, tuple[str, str]] = {

@@ -1,5 +1,7 @@
 """The words of pages for people who know no statistics; the docs' glossary has them from here."""
 
+from service.enums import Act, Answer
+from service.wording.acts import ACTS
 from service.wording.language import N_
 
 WORDS = {
@@ -79,24 +81,13 @@ WORDS = {
         ),
     },
     N_("What is done"): {
-        N_("It was put back"): N_(
-            "The camera was turned to where it had been. What was learned stays."
-        ),
-        N_("Keep the new aim"): N_("Where it looks now is right. That is learned anew."),
-        N_("It was put right"): N_(
-            "Clock, tracker or view is as it should be. The next people tell."
-        ),
-        N_("Acknowledge"): N_("Tell the others that you look after it. The alert stays open."),
-        N_("Silence"): N_("Nobody is woken by the alert until then. It stays open."),
-        N_("Maintenance"): N_(
-            "Somebody is at the camera: nothing is judged or learned until they left."
-        ),
-        N_("Learn anew at the old aim"): N_(
-            "The camera stands, but other people walk there now, or elsewhere."
-        ),
-        N_("Site and tags"): N_(
-            "Where a camera belongs, such as campus/north/gate, and words by which you find "
-            "it, such as outdoor."
-        ),
+        N_("It was put back"): ACTS[Answer.PUT_BACK].means,
+        N_("Keep the new aim"): ACTS[Answer.ACCEPTED].means,
+        N_("It was put right"): ACTS[Answer.MENDED].means,
+        N_("Acknowledge"): ACTS[Act.ACKNOWLEDGE].means,
+        N_("Silence"): ACTS[Act.SILENCE].means,
+        N_("Maintenance"): ACTS[Act.MAINTENANCE].means,
+        N_("Learn anew at the old aim"): ACTS[Act.RESET].means,
+        N_("Site and tags"): ACTS[Act.TAG].means,
     },
 }
