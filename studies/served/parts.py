@@ -23,26 +23,30 @@ from studies.served.tasks import Table, tasks_of, work
 BETWEEN = markers("parts", "python -m studies parts --write")
 WHOLE = "nothing"
 _BATCH = 50  # tracks that come at once
+_TABLES = (Table.FEW, Table.FAR)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartFigures:
-    """Figures of cases with a part off: degrees, shares; `fault` is empty where nothing is wrong.
+    """Figures of cases with a part off: degrees, shares.
 
+    `fault` is a fault, a table of other cases (few tracks, far pans), or empty: cases by time.
     `covered` is the share of identifiable parameters whose 90 % interval holds the truth, `beyond`
-    the cases with one more than 5 standard deviations off, `cpu_s` seconds a case.
+    the cases with one more than 5 standard deviations off, `told` the share of those that moved
+    of which that is said, `cpu_s` seconds a case.
     """
 
     part: str
     fault: str
     cases: int
-    still_deg: float
+    still_deg: float | None
     moved_deg: float
     moved_p90_deg: float
     height_error: float
     covered: float
     beyond: int
     cut: float
+    told: float
     cpu_s: float
 
 
@@ -77,37 +81,41 @@ def run_parts(
 
 def measure(part: str, fault: str, folders: Sequence[Path], seeds: int) -> PartFigures:
     """The figures of all cases with a part off, or with all of them."""
-    table = Table.FAULTS if fault else Table.TIME
+    table = Table(fault) if fault in _TABLES else Table.FAULTS if fault else Table.TIME
     tasks = tasks_of(
-        folders, tables=[table], seeds=range(seeds), batch=_BATCH, faults=[fault] if fault else []
+        folders,
+        tables=[table],
+        seeds=range(seeds),
+        batch=_BATCH,
+        faults=[fault] if table == Table.FAULTS else [],
     )
     plan = served_plan(_BATCH)
     begun_s, rows = time.process_time(), []
     with nullcontext() if part == WHOLE else PARTS[part].switched_off():
         for task in tasks:
-            if all(case.fault == fault for case in task.case_ids):  # not those without a fault
+            # Of faults not those without any.
+            if table != Table.FAULTS or all(case.fault == fault for case in task.case_ids):
                 rows += work(task, plan)
     served = [row for row in rows if isinstance(row.outcome, ServedOutcome)]
     outcomes = [row.outcome for row in served if isinstance(row.outcome, ServedOutcome)]
-    still = figures_of(
-        [o for r, o in zip(served, outcomes, strict=True) if _stands(r.case_id.knock)]
-    )
-    moved = figures_of(
-        [o for r, o in zip(served, outcomes, strict=True) if not _stands(r.case_id.knock)]
-    )
+    pairs = list(zip(served, outcomes, strict=True))
+    stood = [o for r, o in pairs if _stands(r.case_id.knock)]
+    turned = [o for r, o in pairs if not _stands(r.case_id.knock)]
+    moved = figures_of(turned)
     every = figures_of(outcomes)
     own = [n for outcome in outcomes for n in outcome.parameters if n.identifiable]
     return PartFigures(
         part=part,
         fault=fault,
         cases=len(outcomes),
-        still_deg=still.rotation_deg,
+        still_deg=figures_of(stood).rotation_deg if stood else None,
         moved_deg=moved.rotation_deg,
         moved_p90_deg=moved.rotation_p90_deg,
         height_error=moved.height_error,
         covered=sum(n.covered for n in own) / max(len(own), 1),
         beyond=every.beyond,
         cut=every.cut,
+        told=sum(o.state == "drifting" for o in turned) / max(len(turned), 1),
         cpu_s=(time.process_time() - begun_s) / max(len(outcomes), 1),
     )
 
@@ -117,7 +125,7 @@ def table_of(found: Iterable[PartFigures]) -> str:
     by_key = {(each.part, each.fault): each for each in found}
     head = (
         "off", "with", "n", "still, deg", "moved, deg (worst tenth)", "height", "covered",
-        "beyond 5 sd", "cut", "CPU-s a case", "lines",
+        "beyond 5 sd", "cut", "told", "CPU-s a case", "lines",
     )  # fmt: skip
     rows = [head, ("---",) * len(head)]
     for part, fault in _wanted():
@@ -133,12 +141,13 @@ def _row(each: PartFigures) -> tuple[str, ...]:
         each.part if part is None else f"{each.part}: {part.words}",
         each.fault or "nothing wrong",
         str(each.cases),
-        f"{each.still_deg:.2f}",
+        "-" if each.still_deg is None else f"{each.still_deg:.2f}",
         f"{each.moved_deg:.2f} ({each.moved_p90_deg:.1f})",
         f"{each.height_error:.1%}",
         f"{each.covered:.0%}",
         str(each.beyond),
         f"{each.cut:.0%}",
+        f"{each.told:.0%}",
         f"{each.cpu_s:.2f}",
         "" if part is None else str(part.lines),
     )
