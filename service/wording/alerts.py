@@ -27,7 +27,17 @@ KINDS = {
     AlertKind.MANY_MOVED: N_("Cameras of a tracker moved together"),
     AlertKind.MANY_SILENT: N_("Cameras of a tracker fell silent together"),
 }
-# The same in a word, for a badge.
+# In a line of a list, where an alert has no numbers that tell it.
+LINES = {
+    AlertKind.CLOCK: N_(
+        "people seem to walk too fast or too slowly: its clock or frame rate looks wrong"
+    ),
+    AlertKind.LENS: N_("it shows another angle of view: zoomed, or its picture is cut otherwise"),
+    AlertKind.UNSURE: N_(
+        "people walk on none of the learned paths: turned far, or they walk elsewhere"
+    ),
+}
+# The kinds in a word, for a badge.
 BADGES = {
     AlertKind.DRIFT: N_("Moved"),
     AlertKind.CLOCK: N_("Clock"),
@@ -192,12 +202,8 @@ class AnswerWords:
 
 def alert_line(alert: AlertRecord) -> str:
     """What an alert tells of, in a line of a list."""
-    if alert.kind == AlertKind.CLOCK:
-        return _("people seem to walk too fast or too slowly: its clock or frame rate looks wrong")
-    if alert.kind == AlertKind.LENS:
-        return _("it shows another angle of view: zoomed, or its picture is cut otherwise")
-    if alert.kind == AlertKind.UNSURE:
-        return _("people walk on none of the learned paths: turned far, or they walk elsewhere")
+    if alert.kind in LINES:
+        return _(LINES[alert.kind])
     if alert.kind == AlertKind.DRIFT and (moved := offset_words(alert.drift)):
         return moved
     return in_words(alert.reasons)

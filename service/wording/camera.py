@@ -10,7 +10,7 @@ from service.enums import AlertKind, AlertState, PoseState, TrainingState
 from service.reasons import ServiceCode
 from service.store.alerts import MOVED_KINDS, SCALE_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
-from service.wording.alerts import KINDS
+from service.wording.alerts import KINDS, LINES
 from service.wording.language import N_, _, _n, inner
 from service.wording.moves import drift_words, moved_words, sure_words
 from service.wording.reasons import in_words
@@ -215,10 +215,9 @@ def fleet_line(
         wanted: as many make a reference.
         silent_s: since the newest track ended.
     """
-    if state == PoseState.DRIFTING and AlertKind.CLOCK in kinds:
-        return _("people seem to walk too fast or too slowly: its clock or frame rate looks wrong")
-    if state == PoseState.DRIFTING and AlertKind.LENS in kinds:
-        return _("it shows another angle of view: zoomed, or its picture is cut otherwise")
+    scaled = next((kind for kind in kinds if kind in SCALE_KINDS), None)
+    if state == PoseState.DRIFTING and scaled is not None:
+        return _(LINES[scaled])
     if kinds and kinds[0] == AlertKind.STALE:
         return _("its estimate fails or lacks tracks: the alert says why, and since when")
     if state == PoseState.UNCONNECTED:
@@ -230,7 +229,7 @@ def fleet_line(
     if state == PoseState.LEARNING:
         return _("waiting for people to tell how it stands now")
     if state == PoseState.UNSURE:
-        return _("people walk on none of the learned paths: turned far, or they walk elsewhere")
+        return _(LINES[AlertKind.UNSURE])
     if state == PoseState.NO_DATA:
         time = duration(silent_s)
         return _("no people seen for {time}, longer than is usual here", time=time)
