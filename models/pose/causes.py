@@ -18,7 +18,7 @@ from models.geometry.pose import array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import CLOCK
 from models.monitoring.config import HABITS_OF_DAYS
-from models.monitoring.verdict import reason_of_scale
+from models.monitoring.verdict import LIKELY, reason_of_scale
 from models.paths.likelihood import Walkers, walkers_of
 from models.paths.reference import PathReference
 from models.pose import config
@@ -160,14 +160,17 @@ def reason_of_causes(
     moved: float,
     certainty: float,
     frame_rate_hz: float | None,
+    drifted: tuple[str, ...] = (),
 ) -> Reason | None:
     """The reason of a wrong clock or lens; None where a move, or nothing, explains as much.
 
     `moved` is how likely the camera did, whatever the cause: of a change that is certain, the name
-    need not be as certain.
+    need not be as certain. One that was told, as a drift in height alone, lasts while it is
+    likelier wrong than not.
     """
     if causes is None:
         return None
+    certainty = LIKELY if drifted == ("height",) else certainty
     clock, lens = causes
     wanted = min(config.CAUSE_NAMED, certainty) if moved >= certainty else certainty
     if max(clock.probability, lens.probability) < wanted:

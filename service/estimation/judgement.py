@@ -77,8 +77,13 @@ class Case:
     def judged(self) -> Judgement:
         """The judgement."""
         finding, turned = self.finding, self.finding.posterior.turned
-        wrong = self._other_cause()
-        cause = wrong
+        cause = wrong = reason_of_causes(
+            finding.causes,
+            finding.posterior.moved,
+            self.evidence.limits.certainty,
+            self.frame_rate_hz,
+            self.history.drifted,
+        )
         if finding.causes is None:
             cause = clock_fault(self.drift, turned, self.evidence.prior, self.frame_rate_hz)
         chart = self._counting_chart(cause)
@@ -99,17 +104,6 @@ class Case:
         return Judgement(
             state=state, reasons=reasons, verdict=verdict, after=after, since=since, cause=cause
         )
-
-    def _other_cause(self) -> Reason | None:
-        """The reason of a clock or a lens that is surely wrong before a camera that stands.
-
-        One that was told lasts while it is likelier wrong than not.
-        """
-        told = self.history.drifted == ("height",)
-        certainty = LIKELY if told else self.evidence.limits.certainty
-        finding = self.finding
-        moved = finding.posterior.moved
-        return reason_of_causes(finding.causes, moved, certainty, self.frame_rate_hz)
 
     def _counting_chart(self, cause: Reason | None) -> ChartResult | None:
         """The drift chart's result, unless it is explained without a move."""

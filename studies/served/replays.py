@@ -20,6 +20,7 @@ from models.pose import (
     alarm_chart_result,
     learn_site,
     observe,
+    reason_of_causes,
     since_alarm,
 )
 from models.reasons import TracksCode
@@ -145,7 +146,10 @@ def _watch(
         finding = look.finding
         result = alarm_chart_result(look.seen, site, rate, first=finding.first)
         finding = since_alarm(finding, look.seen, site, result)
-        verdict = judge(finding.drift, plan.limits, drifted, result)
+        cause = reason_of_causes(
+            finding.causes, finding.posterior.moved, plan.limits.certainty, None, drifted
+        )
+        verdict = judge(finding.drift, plan.limits, drifted, result, scaled=cause is not None)
         drifted = verdict.drifted
         found.append(_Watched(look=replace(look, finding=finding), alarm=verdict.drifting))
     return found
