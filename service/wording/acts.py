@@ -52,7 +52,7 @@ ACTS: dict[Answer | Act, ActWords] = {
         one=N_("Silence…"),
         many=N_("Silence…"),
         done=N_("Silenced"),
-        means=N_("Nobody is woken by the alert until then. It stays open."),
+        means=N_("Nobody is woken by the alert for a time that you say. It stays open."),
     ),
     Act.MAINTENANCE: ActWords(
         one=N_("Plan maintenance…"),
