@@ -47,8 +47,8 @@ START_QUANTILES = (0.4, 0.6, 0.75)  # of all speeds, standing people's too, to b
 POSE_PRIOR_SD = np.array([math.radians(10), math.radians(10), 0.3])  # holds what tracks leave free
 LONGEST_MOVE = np.array([0.06, 0.06, 0.25])  # of one round: tilt, roll, log height
 MOST_ROUNDS = 40
-CONVERGED = 1e-5  # rad and log height
-ROUGHLY = 0.1  # standard deviations, from a warm start: a round more moves it by some hundredths
+CONVERGED = 0.01  # standard deviations, of one round
+ROUGHLY = 0.1  # from a warm start: a round more moves it by some hundredths
 SAME_MODE = np.array([math.radians(0.2), math.radians(0.2), 0.02])  # nearer are one mode
 LEAST_LOG_ODDS = 12.0  # below the best mode, over the variance inflation: others are not named
 

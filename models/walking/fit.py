@@ -111,6 +111,7 @@ def fit_pose(channels: Sequence[Channel], start: FitStart, prior: CameraPose | N
     # Near the end by the information of Student-t, which is less than its weights say.
     # Source: Lange, Little and Taylor 1989, scoring.
     share, last = FISHER, np.zeros(3, dtype=np.float64)
+    settled = config.ROUGHLY if start.warm else config.CONVERGED
     for _ in range(config.MOST_ROUNDS):
         # Given the pose, the fields are independent: each is eliminated by itself.
         matrix = pose_precision.copy()
@@ -139,9 +140,7 @@ def fit_pose(channels: Sequence[Channel], start: FitStart, prior: CameraPose | N
             mean - share * (both[:, 3] + both[:, :3] @ move)
             for mean, both in zip(means, solved, strict=True)
         ]
-        if np.abs(share * move).max() < config.CONVERGED:
-            break
-        if start.warm and share * share * float(move @ matrix @ move) < config.ROUGHLY**2:
+        if share * share * float(move @ matrix @ move) < settled**2:
             break
     apart = candidate - middle
     log_likelihood = -0.5 * float(apart @ pose_precision @ apart)
