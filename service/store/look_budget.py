@@ -2,7 +2,7 @@
 
 CPU and memory of a look grow with the rows that are made of its tracks, one for each node and
 another for its box or head, and with their points, which is known before any is read: 30,000 rows
-are up to 20 CPU-s of an estimate, 4 of a map, and 60 MB.
+are up to 30 CPU-s of an estimate, 4 of a map, and 60 MB.
 """
 
 from collections.abc import Sequence
