@@ -38,6 +38,8 @@ class Attendance:
 
     def free_since_s(self, now: datetime) -> float | None:
         """The time at which somebody last left the camera; None where nobody was there."""
+        if not self.spans:
+            return None  # nearly all of a fleet's cameras
         left = [to_s for _, to_s in self.spans if to_s <= now.timestamp()]
         return left[-1] if left else None
 

@@ -55,34 +55,36 @@ class Entry:
         calm = self.rank >= _CALM
         return self.rank, 0 if calm else -self.since_s, self.label.name.casefold(), self.id
 
-    @property
-    def line(self) -> list[str | int | None]:
-        """As the page's script reads it (fleet.js)."""
-        return [
+    def line(self, place: str | int) -> tuple[str | int | None, ...]:
+        """As the page's script reads it (fleet.js), with its place, or the number of that."""
+        return (
             *(self.id, self.label.name, self.shown, self.rank, self.waiting, self.since_s),
-            *(self.last_s, self.words, self.kinds, self.label.place),
-        ]
+            *(self.last_s, self.words, self.kinds, place),
+        )
 
     def fits(
         self, states: Collection[str], words: Iterable[str], site: str, tags: Iterable[str]
     ) -> bool:
         """True of one of some states and of a site, if any are named, with all words and tags."""
         own = self.label
-        text = f"{own.name} {self.id} {_(STATES[self.shown])} {self.words} {own.place}".casefold()
         return (
             (not states or self.shown in states)
             and (not site or own.site == site or own.site.startswith(f"{site}/"))
             and set(tags) <= set(own.tags)
-            and all(word in text for word in words)
+            and all(word in self._text for word in words)
         )
+
+    @property
+    def _text(self) -> str:
+        state, own = _(STATES[self.shown]), self.label
+        return f"{own.name} {self.id} {state} {self.words} {own.place}".casefold()
 
 
 def index_document(entries: Sequence[Entry]) -> dict[str, Any]:
     """The lines of all, with each place once: they name it by its number."""
-    places = {entry.label.place: 0 for entry in entries}
-    numbers = {place: number for number, place in enumerate(places)}
-    lines = [[*entry.line[:-1], numbers[entry.label.place]] for entry in entries]
-    return {"places": list(places), "cameras": lines}
+    numbers: dict[str, int] = {}
+    lines = [each.line(numbers.setdefault(each.label.place, len(numbers))) for each in entries]
+    return {"places": list(numbers), "cameras": lines}
 
 
 def entry_of(status: CameraStatus, label: Label, now: datetime) -> Entry:
@@ -113,6 +115,8 @@ def fleet_index(session: Session, settings: Settings) -> list[Entry]:
 
 def attended_until(status: CameraStatus, now: datetime) -> datetime | None:
     """The end of the maintenance that is under way."""
+    if not status.attended.spans:
+        return None  # nearly all of a fleet's cameras
     now_s = now.timestamp()
     ends = (to_s for from_s, to_s in status.attended.spans if from_s <= now_s < to_s)
     return next((from_seconds(to_s) for to_s in ends), None)

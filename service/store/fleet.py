@@ -7,7 +7,7 @@ import math
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from sqlalchemy import (
@@ -183,7 +183,12 @@ class Label:
     @property
     def place(self) -> str:
         """Site and tags in a line, such as "campus/north #outdoor", as pages read it, too."""
-        return " ".join([*([self.site] if self.site else []), *(f"#{tag}" for tag in self.tags)])
+        return _place_of(self.site, self.tags)
+
+
+@lru_cache(maxsize=1024)  # a fleet's places are few, and a page asks for each camera's
+def _place_of(site: str, tags: tuple[str, ...]) -> str:
+    return " ".join([*([site] if site else []), *(f"#{tag}" for tag in tags)])
 
 
 def labels(session: Session, ids: Ids) -> dict[str, Label]:

@@ -6,7 +6,7 @@ import { ALERT_ACTS, done, listen } from "./alert_acts.js";
 import { answer, offer, undoneHere, withMany } from "./bulk_acts.js";
 import { signed } from "./dialogs.js";
 import { gathered, subscribe } from "./events.js";
-import { showPlaces, within } from "./places.js";
+import { placed, showPlaces, within } from "./places.js";
 import { keepTimes } from "./times.js";
 import { _, _n } from "./words.js";
 
@@ -39,10 +39,8 @@ let wanted = []; // the ids of this page
 /** Take a line of the index; a row says its place itself, the index by its number. */
 function note([id, name, state, rank, waiting, since, last, words, kinds, at], told = []) {
   const place = told[at] ?? at;
-  const text = `${name} ${id} ${WORDS[state]} ${words} ${place}`.toLowerCase();
-  const site = place.split("#")[0].trim();
-  const tags = (place.match(/#\S+/g) ?? []).map((tag) => tag.slice(1));
-  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text, kinds, site, tags });
+  const text = () => `${name} ${id} ${WORDS[state]} ${words} ${place}`.toLowerCase();
+  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text, kinds, ...placed(place) });
 }
 
 const noteAll = (told) => told.cameras.forEach((line) => note(line, told.places));
@@ -59,10 +57,12 @@ const ORDERS = {
 /** The cameras of the site and tags that are asked for. */
 const here = () => [...index.values()].filter((camera) => within(camera, chosenPlace));
 
+const has = (text, words) => words.every((word) => text.includes(word));
+
 /** The cameras that are asked for, in their order. */
 function matching() {
   const words = search.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
-  const fits = ({ state, text }) => (!states.size || states.has(state)) && words.every((word) => text.includes(word));
+  const fits = ({ state, text }) => (!states.size || states.has(state)) && (!words.length || has(text(), words));
   return here().filter(fits).sort(ORDERS[sort.value] ?? ORDERS[""]);
 }
 

@@ -4,8 +4,20 @@ import { _ } from "./words.js";
 
 const MOST = 24; // of sites, and of tags; of more, the search finds the others
 
+const said = new Map(); // places are few, cameras many
+
+/** The site and the tags that a place says, such as "campus/north #outdoor". */
+export function placed(place) {
+  if (!said.has(place)) {
+    const [site, ...tags] = place.split("#").map((word) => word.trim());
+    said.set(place, { site, tags });
+  }
+  return said.get(place);
+}
+
 /** True of a camera that lies at a site or below it and has all of some tags. */
 export function within({ site, tags }, wanted) {
+  if (!wanted.site && !wanted.tags.size) return true;
   const inside = !wanted.site || site === wanted.site || site.startsWith(`${wanted.site}/`);
   return inside && [...wanted.tags].every((tag) => tags.includes(tag));
 }
