@@ -68,8 +68,8 @@ def undo_answer(
     if entry is None:
         minutes = UNDO_WITHIN.total_seconds() / 60
         raise ConflictError(
-            f"pose: no answer of the last {minutes:g} minutes is the last thing that was said or "
-            "learned of the camera, so there is none to take back"
+            f"pose: there is nothing to undo: nobody has answered within {minutes:g} minutes, or "
+            "something was said or learned since"
         )
     before = entry.details["before"]
     _restore_pose(session, queue, settings, camera_id, before)

@@ -1,5 +1,6 @@
 """All cameras of the fleet in a few numbers each: what its page sifts, sorts and counts by."""
 
+import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -53,7 +54,7 @@ class Entry:
     def order(self) -> tuple[int, int, str, str]:
         """Sorts first what a person should look at first; of one kind the newest, then by name."""
         calm = self.rank >= _CALM
-        return self.rank, 0 if calm else -self.since_s, self.label.name.casefold(), self.id
+        return self.rank, 0 if calm else -self.since_s, sortable(self.label.name), self.id
 
     def line(self, place: str | int) -> tuple[str | int | None, ...]:
         """As the page's script reads it (fleet.js), with its place, or the number of that."""
@@ -78,6 +79,11 @@ class Entry:
     def _text(self) -> str:
         state, own = _(STATES[self.shown]), self.label
         return f"{own.name} {self.id} {state} {self.words} {own.place}".casefold()
+
+
+def sortable(name: str) -> str:
+    """A name as it is sorted by, here and by the page's script: gate 2 comes before gate 10."""
+    return re.sub("[0-9]+", lambda digits: digits[0].zfill(9), name.casefold())
 
 
 def index_document(entries: Sequence[Entry]) -> dict[str, Any]:

@@ -15,15 +15,19 @@ const ANSWERED = { status: 409, detail: "state: only a firing alert takes this" 
 
 // --- What is offered -----------------------------------------------------------------------------
 
-/** Offer what all of some items take, each of some `kinds`; says in words why it is no more. */
+/**
+ * Offer what all of some items take, each of some `kinds`; says in words why it is no more. `waiting`
+ * are an item's alerts that nobody has taken up: nobody is asked to acknowledge one a second time.
+ */
 export function offer(bulk, items, noun) {
   bulk.hidden = !items.length;
   document.getElementById("chosen").textContent = counted(items.length, noun);
   let lost = false;
   for (const button of bulk.querySelectorAll("[data-takes]")) {
     const able = items.filter(({ kinds }) => takes(kinds, button.dataset.takes)).length;
-    button.hidden = able < items.length;
-    lost ||= able > 0 && button.hidden;
+    const seen = button.dataset.takes === "acknowledge" && items.every(({ waiting }) => !Number(waiting));
+    button.hidden = able < items.length || seen;
+    lost ||= able > 0 && able < items.length;
   }
   const answers = bulk.querySelector('[data-bulk="resolve"]:not([hidden])');
   document.getElementById("mixed").textContent = lost || !answers ? mixture(items, lost) : "";
@@ -32,7 +36,7 @@ export function offer(bulk, items, noun) {
 const takes = (kinds, act) => kinds.split(" ").some((kind) => RULE.kinds[kind].takes.includes(act));
 
 /**
- * "2 of 5 are clock faults: choose them apart." All but the most of a kind are named; where none of
+ * "Choose them apart to answer them: 2 of 5 are clock faults." All but the most of a kind are named; where none of
  * them can be answered, all: "3 of 3 are answered with their tracker."
  */
 function mixture(items, lost) {
@@ -46,7 +50,7 @@ function mixture(items, lost) {
   });
   if (!lost) return items.length ? `${parts.join(", ")}.` : "";
   const [one] = fewer.length === 1 ? fewer[0].slice(1) : [0];
-  return _n("{some}: choose it apart.", "{some}: choose them apart.", one, { some: parts.join(", ") });
+  return _n("Choose it apart to answer it: {some}.", "Choose them apart to answer them: {some}.", one, { some: parts.join(", ") });
 }
 
 const counted = (n, noun) =>

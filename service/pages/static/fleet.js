@@ -19,6 +19,7 @@ const pager = document.getElementById("pager");
 const chips = [...document.querySelectorAll(".chip")];
 const found = document.getElementById("found");
 const none = document.getElementById("none");
+const due = document.getElementById("due");
 const places = document.getElementById("places");
 const plainTitle = document.title.replace(/^\(\d+\) /, "");
 const PAGE = Number(list.dataset.page);
@@ -36,11 +37,14 @@ const chosenPlace = { site: "", tags: new Set() };
 let page = 0;
 let wanted = []; // the ids of this page
 
+/** A name as it is sorted by: gate 2 comes before gate 10 (fleet_index.py). */
+const sortable = (name) => name.toLowerCase().replace(/[0-9]+/g, (digits) => digits.padStart(9, "0"));
+
 /** Take a line of the index; a row says its place itself, the index by its number. */
 function note([id, name, state, rank, waiting, since, last, words, kinds, at], told = []) {
   const place = told[at] ?? at;
   const text = () => `${name} ${id} ${WORDS[state]} ${words} ${place}`.toLowerCase();
-  index.set(id, { id, name: name.toLowerCase(), state, rank, waiting, since, last, text, kinds, ...placed(place) });
+  index.set(id, { id, name: sortable(name), state, rank, waiting, since, last, text, kinds, ...placed(place) });
 }
 
 const noteAll = (told) => told.cameras.forEach((line) => note(line, told.places));
@@ -96,6 +100,7 @@ function say(cameras) {
     chip.classList.toggle("empty-state", !count);
     chip.setAttribute("aria-pressed", String(states.has(chip.dataset.state)));
   }
+  due.textContent = waiting ? _n("{n} needs a person", "{n} need a person", waiting) : index.size ? _("Nothing needs a person") : "";
   document.title = (waiting ? `(${waiting}) ` : "") + plainTitle;
   none.hidden = cameras.length > 0;
   if (index.size) none.textContent = _("No camera is like that.");
@@ -267,6 +272,7 @@ const chosenOnes = () =>
   [...chosen].map((camera) => ({
     camera,
     kinds: index.get(camera).kinds,
+    waiting: index.get(camera).waiting,
     name: rows.get(camera)?.querySelector(".who a").textContent,
   }));
 
