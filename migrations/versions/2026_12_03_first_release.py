@@ -29,13 +29,13 @@ ACTIVITY = (
     "camera.registered camera.changed camera.described camera.removed pose.agreed pose.accepted "
     "pose.put_back pose.mended pose.false_alarm pose.undone reference.reset reference.learned "
     "source.used source.removed alert.opened alert.grew alert.escalated alert.mailed "
-    "alert.acknowledged alert.silenced alert.silence_ended alert.resolved alert.reopened "
-    "maintenance.planned maintenance.changed maintenance.ended maintenance.withdrawn "
-    "maintenance.over training.requested training.succeeded training.failed training.cancelled "
-    "snapshot.kept snapshot.removed plan.kept plan.removed zones.drawn webhook.added "
-    "webhook.changed webhook.secret_changed webhook.removed webhook.tested webhook.replayed "
-    "token.added token.revoked session.began session.ended login.refused settings.changed "
-    "handover.given handover.taken"
+    "alert.acknowledged alert.given_back alert.silenced alert.silence_ended alert.resolved "
+    "alert.reopened maintenance.planned maintenance.changed maintenance.ended "
+    "maintenance.withdrawn maintenance.over training.requested training.succeeded training.failed "
+    "training.cancelled snapshot.kept snapshot.removed plan.kept plan.removed zones.drawn "
+    "webhook.added webhook.changed webhook.secret_changed webhook.removed webhook.tested "
+    "webhook.replayed token.added token.revoked session.began session.ended login.refused "
+    "settings.changed handover.given handover.taken"
 )
 
 

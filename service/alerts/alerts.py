@@ -40,6 +40,7 @@ _NOTIFIED_AS = {
     AlertActivity.OPENED: MessageType.ALERT_OPENED,
     AlertActivity.ESCALATED: MessageType.ALERT_ESCALATED,
     AlertActivity.ACKNOWLEDGED: MessageType.ALERT_ACKNOWLEDGED,
+    AlertActivity.GIVEN_BACK: MessageType.ALERT_UPDATED,
     AlertActivity.SILENCED: MessageType.ALERT_SILENCED,
     AlertActivity.SILENCE_ENDED: MessageType.ALERT_UPDATED,
     AlertActivity.RESOLVED: MessageType.ALERT_RESOLVED,
@@ -217,6 +218,20 @@ def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertR
         record.acknowledged_by = by or "someone"
         record.acknowledged_at = datetime.now(UTC)
         note_on_alert(session, record, AlertActivity.ACKNOWLEDGED, record.acknowledged_by)
+    return record
+
+
+def give_back(session: Session, alert_id: str, by: str | None) -> AlertRecord:
+    """Have an alert that somebody acknowledged wait for a person again.
+
+    Raises:
+        NotFoundError: there is none of that id.
+        ConflictError: it is resolved.
+    """
+    record = require_firing(session, alert_id)
+    if record.acknowledged_at is not None:
+        record.acknowledged_by = record.acknowledged_at = record.escalated_at = None
+        note_on_alert(session, record, AlertActivity.GIVEN_BACK, by)
     return record
 
 

@@ -44,9 +44,10 @@ from service.wording.times import from_seconds
 
 
 class AcknowledgeBody(Body):
-    """Who has seen the alert."""
+    """Who looks after the alert; `acknowledged` false gives it back to whoever takes it up."""
 
     by: Who | None = None
+    acknowledged: bool = True
 
 
 class SilenceBody(Body):
@@ -326,9 +327,10 @@ def evidence(alert_id: str, session: ReadDep) -> EvidenceOut:
 def acknowledge(
     alert_id: str, session: WriteDep, body: AcknowledgeBody | None = None
 ) -> AlertDetail:
-    """Note who has seen an alert."""
-    by = name_in(session, None if body is None else body.by)
-    return _with_acts(session, alerts.acknowledge_alert(session, alert_id, by))
+    """Note who looks after an alert, or that they do no more."""
+    said = body or AcknowledgeBody()
+    act = alerts.acknowledge_alert if said.acknowledged else alerts.give_back
+    return _with_acts(session, act(session, alert_id, name_in(session, said.by)))
 
 
 @router.post("/{alert_id}/silence")

@@ -126,6 +126,8 @@ MEMBER_KINDS = {
     AlertKind.MANY_SILENT: (AlertKind.NO_DATA,),
 }
 MEMBER = "member"  # instead of its kind, of an alert that is answered with its group
+# After these an alert waits for somebody as if it had just opened.
+TOLD_ANEW = (Activity.ALERT_REOPENED, Activity.ALERT_GIVEN_BACK, Activity.ALERT_SILENCE_ENDED)
 SERVICE_KINDS = (AlertKind.STALE,)  # about the service itself, whatever is done at the camera
 
 # Built once: each reconcile of a camera asks for it.
@@ -259,7 +261,7 @@ def unheeded(session: Session, since: datetime, now: datetime) -> Sequence[Alert
     """Open alerts that nobody has taken up since a time, told of last before it, and once yet."""
     told_anew = exists().where(
         ActivityRecord.subject_id == AlertRecord.id,
-        ActivityRecord.what.in_((Activity.ALERT_REOPENED, Activity.ALERT_SILENCE_ENDED)),
+        ActivityRecord.what.in_(TOLD_ANEW),
         ActivityRecord.at > since,
     )
     return session.scalars(

@@ -142,6 +142,7 @@ _DONE = {
     Activity.SOURCE_USED: N_("{who} said whose tracks count; the reference is learned anew"),
     Activity.SOURCE_REMOVED: N_("{who} removed a source of tracks with its tracks"),
     Activity.ALERT_ACKNOWLEDGED: N_("{who} acknowledged {alert}"),
+    Activity.ALERT_GIVEN_BACK: N_("{who} gave {alert} back: it waits for a person again"),
     Activity.ALERT_SILENCED: N_("{who} silenced {alert} until {until}"),
     Activity.ALERT_SILENCE_ENDED: N_("{who} ended the silence of {alert}"),
     Activity.ALERT_RESOLVED: N_("{who} closed {alert}: {outcome}"),

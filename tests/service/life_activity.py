@@ -96,11 +96,12 @@ class LifeActs(LifeEvents):
             else:
                 self.answered.add(item["id"])
 
-    @rule(n=some, by=names)
-    def acknowledge(self, n: int, by: str | None) -> None:
+    @rule(n=some, by=names, seen=st.booleans())
+    def acknowledge(self, n: int, by: str | None, seen: bool) -> None:
         alert = self.alert(n)
         if alert is not None:
-            self.call("POST", f"/alerts/{alert['id']}/acknowledge", json=said(by=by))
+            body = said(by=by, acknowledged=seen)
+            self.call("POST", f"/alerts/{alert['id']}/acknowledge", json=body)
 
     @rule(n=some, hours=st.sampled_from([None, 0.2, 40]))
     def silence(self, n: int, hours: float | None) -> None:

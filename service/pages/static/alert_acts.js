@@ -27,6 +27,10 @@ export const ALERT_ACTS = {
     return done(_("Acknowledged."), signed("POST", path(alert, "acknowledge")));
   },
 
+  "give-back"({ alert }) {
+    return done(_("Given back."), signed("POST", path(alert, "acknowledge"), { acknowledged: false }));
+  },
+
   silence({ alert }) {
     return ask("silence-dialog", {
       send: (said) => done(_("Silenced."), signed("POST", path(alert, "silence"), silenceOf(said))),

@@ -242,6 +242,26 @@ def test_acknowledge_keeps_the_first_and_resolve_ends(bench):
     assert len(bench.alerts(state="firing")) == 1
 
 
+def test_who_acknowledged_by_mistake_gives_it_back(bench):
+    """An alert that nobody looked after was silent for good: it neither waited nor escalated."""
+    for _ in range(3):
+        bench.see(moved(roll_deg=-4.0))
+    url = f"/alerts/{bench.alerts()[0]['id']}"
+    bench.http.post(f"{url}/acknowledge", json={"by": "Ada"}).raise_for_status()
+    assert bench.alerts(acknowledged=False) == []
+    assert "Give back" in bench.http.get("/ui/alerts").text
+    for by in ("Ada", "Bob"):  # the second time nothing happens
+        back = bench.http.post(f"{url}/acknowledge", json={"by": by, "acknowledged": False}).json()
+        assert (back["acknowledged"], back["acknowledged_by"]) == (False, None)
+    assert [(act["act"], act["by"]) for act in back["acts"]][-2:] == [
+        ("acknowledged", "Ada"),
+        ("given_back", "Ada"),
+    ]
+    assert bench.events("alert")[-1]["acknowledged_by"] is None
+    assert len(bench.alerts(acknowledged=False)) == 1
+    assert "Give back" not in bench.http.get("/ui/alerts").text
+
+
 def test_another_prior_pose_ends_the_alert_against_the_old_one(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=5.0))

@@ -4,6 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
+from service.alerts.escalation import escalate
 from service.alerts.staleness import StaleWatch
 from service.store.alerts import AlertRecord
 from service.workers.context import JobContext
@@ -52,6 +53,20 @@ def test_it_is_told_once_and_said_on_the_pages(duty, inbox):
     page = duty.http.get("/ui/alerts").text
     assert "acknowledged by Ada" in page
     assert "nobody took it up" not in page
+
+
+def test_what_was_given_back_waits_as_long_again(duty, inbox):
+    alert_id = duty.open()
+    duty.http.post(f"/alerts/{alert_id}/acknowledge").raise_for_status()
+    age(duty, alert_id, 31)
+    body = {"acknowledged": False}
+    duty.http.post(f"/alerts/{alert_id}/acknowledge", json=body).raise_for_status()
+    reconcile(duty)
+    assert "alert.escalated" not in inbox.types()
+    at_once = duty.settings.model_copy(update={"escalate_after_min": 0.0})
+    with duty.store.write() as session:
+        escalate(session, at_once)
+    assert show(duty, alert_id)["escalated_at"] is not None
 
 
 def test_what_somebody_took_up_is_not(duty, inbox):
