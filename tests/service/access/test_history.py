@@ -90,6 +90,7 @@ def look_after_alerts(http, bench):
         mail = escalated.next_mail(session, http.settings)
         escalated.note_mailed(session, mail, None)
     ask(http, "POST", f"{url}/acknowledge")
+    ask(http, "POST", f"{url}/acknowledge", json={"acknowledged": False})
     ask(http, "POST", f"{url}/silence", json={"until": hours(1)})
     ask(http, "POST", f"{url}/silence", json={"until": None})
     bench.see(moved(tilt_deg=5.0))
