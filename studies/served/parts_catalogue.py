@@ -13,6 +13,7 @@ import numpy as np
 from models.paths.map_learning import Bandwidths
 
 _ROOT = Path(__file__).parents[2]
+_FEW_AND_FAR = ("few", "far")
 _COARSE = Bandwidths(place_m=1.0, direction_kappa=6.0)
 
 
@@ -127,25 +128,25 @@ PARTS: dict[str, Part] = {
             ),
         ),
         source=("models.walking.reference_learning:_cross_validated",),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "bandwidths": Part(
         words="the map's bandwidths are chosen by people left out",
         off=(("models.paths.folds:best_bandwidths", lambda *_: _COARSE),),
         source=("models.paths.map_learning:best_bandwidths",),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "path test": Part(
         words="a map that does not fit has no part",
         off=(("models.paths.path_tests:UsualFit.has_changed", lambda *_: False),),
         source=("models.paths.path_tests:UsualFit.has_changed",),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "seen ground": Part(
         words="no heading is identifiable on ground that the reference never saw",
         off=(("models.pose.fusion:on_seen_ground", lambda *_: True),),
         source=("models.paths.registration:on_seen_ground",),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "halves of the people": Part(
         words="the heading is less sure where halves find it apart",
@@ -154,25 +155,25 @@ PARTS: dict[str, Part] = {
             "models.pose.fusion:_covariance_of_halves",
             "models.paths.registration:variance_of_halves",
         ),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "flat posterior": Part(
         words="a posterior flatter than its peak widens the heading",
         off=(("models.pose.fusion:covariance_beyond_gaussian", _nothing(4)),),
         source=("models.pose.modes:covariance_beyond_gaussian",),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "Birge ratio": Part(
         words="speeds and places that disagree are less sure",
         off=(("models.pose.fusion:birge_ratio", lambda *_: 1.0),),
         source=("models.pose.modes:birge_ratio",),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "other modes": Part(
         words="other poses that explain the tracks widen the covariance",
         off=(("models.pose.fusion:covariance_between", _nothing(4)),),
         source=("models.pose.modes:covariance_between",),
-        faults=("few", "far"),
+        faults=_FEW_AND_FAR,
     ),
     "change search": Part(
         words="a window begins anew at a change",
