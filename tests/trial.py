@@ -9,6 +9,7 @@ when its time is over; exits with 1 where one is handled wrongly or not at all.
 """
 
 import argparse
+import signal
 import sys
 import tempfile
 import time
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
 
-from sqlalchemy import select
+from sqlalchemy import select, update
 
 from service.alerts.alerts import open_alert
 from service.commands.migrate import migrate
@@ -26,6 +27,7 @@ from service.settings import Settings
 from service.store import references
 from service.store.alerts import AlertRecord
 from service.store.engines.store import Store
+from service.store.tracks import TrackRecord
 from tests.running import RunningService
 from tests.service.fleet_bench import PLACES, Fleet
 
@@ -105,6 +107,8 @@ def seeded(settings: Settings) -> list[Case]:
             cases.append(_case(number, alert.id, (None, "mended")))
         for number in _TOGETHER:
             references.newest(session, id_of(number)).source = _TRACKER
+            theirs = TrackRecord.camera_id == id_of(number)
+            session.execute(update(TrackRecord).where(theirs).values(source=_TRACKER))
     for number in _TOGETHER:
         fleet.knock(id_of(number), tilt_deg=2.5)
     with fleet.store.read() as session:
@@ -144,6 +148,7 @@ def main() -> int:
         migrate(settings)
         cases = seeded(settings)
         service = RunningService(settings, forked=False)
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # which stops the service, too
         service.start()
         try:
             return _watch(settings, cases, service.url, 60 * asked.minutes)

@@ -26,13 +26,14 @@ _NEEDS = {Act.SILENCE: ("until",), Act.RESOLVE: ("outcome",), Act.MAINTENANCE: (
 class ActsBody(Body):
     """An act, and the ids of alerts or cameras that it is done with, in this order.
 
-    `until` and `reason` are of a silence, `outcome` of a resolution, `from`, `to` and `reason` of
-    maintenance, `add` and `remove` of tags.
+    `acknowledged` false gives acknowledged alerts back. `until` and `reason` are of a silence,
+    `outcome` of a resolution, `from`, `to` and `reason` of maintenance, `add` and `remove` of tags.
     """
 
     ids: Annotated[list[Text], Field(min_length=1, max_length=500)]
     act: Act
     by: Who | None = None
+    acknowledged: bool = True
     note: str | None = Field(None, max_length=2000)
     reason: str | None = Field(None, max_length=2000)
     until: Moment | None = None
@@ -128,7 +129,8 @@ def _undoable(session: Session, one: str, act: Act, begun: datetime) -> dict[str
 
 
 def _acknowledge(session: Session, state: AppState, one: str, body: ActsBody) -> None:
-    alerts.acknowledge_alert(session, one, name_in(session, body.by))
+    noted = alerts.acknowledge_alert if body.acknowledged else alerts.give_back
+    noted(session, one, name_in(session, body.by))
 
 
 def _silence(session: Session, state: AppState, one: str, body: ActsBody) -> None:

@@ -329,8 +329,8 @@ def acknowledge(
 ) -> AlertDetail:
     """Note who looks after an alert, or that they do no more."""
     said = body or AcknowledgeBody()
-    act = alerts.acknowledge_alert if said.acknowledged else alerts.give_back
-    return _with_acts(session, act(session, alert_id, name_in(session, said.by)))
+    noted = alerts.acknowledge_alert if said.acknowledged else alerts.give_back
+    return _with_acts(session, noted(session, alert_id, name_in(session, said.by)))
 
 
 @router.post("/{alert_id}/silence")

@@ -9,11 +9,13 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.cameras.status import CameraStatus, camera_statuses, waits
-from service.enums import AlertKind, PoseState, Severity
+from service.cameras.undo import UNDO_WITHIN
+from service.enums import AlertKind, Origin, PoseState, Severity
 from service.pages.bulk import kinds_of
 from service.settings import Settings
 from service.store import fleet
 from service.store.fleet import Label
+from service.store.references import SiteReferenceRecord
 from service.wording.camera import STATES, shown_as
 from service.wording.language import _
 from service.wording.times import from_seconds
@@ -30,14 +32,16 @@ _RANKS = {
     PoseState.OK: 9,
 }
 _CALM = 6  # from this rank on it does not matter since when
+_BY_ANSWERS = (Origin.ACCEPTED, Origin.RESET, Origin.PUT_BACK)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """A camera of the index: its `rank` is 0 where it needs a person at once, 9 not at all.
 
-    `waiting` are its alerts that nobody has taken up. `words` is what else it is found by: its
-    source of tracks, who has seen its alerts. `kinds` say what can be done with it (bulk.py).
+    `waiting` are its alerts that nobody has taken up. It is `fresh` where an answer may be young
+    enough to be undone. `words` is what else it is found by: its source of tracks, who has seen its
+    alerts. `kinds` say what can be done with it (bulk.py).
     """
 
     id: str
@@ -45,6 +49,7 @@ class Entry:
     shown: PoseState | AlertKind
     rank: int
     waiting: int
+    fresh: bool
     since_s: int
     last_s: int | None
     words: str
@@ -60,7 +65,7 @@ class Entry:
         """As the page's script reads it (fleet.js), with its place, or the number of that."""
         return (
             *(self.id, self.label.name, self.shown, self.rank, self.waiting, self.since_s),
-            *(self.last_s, self.words, self.kinds, place),
+            *(int(self.fresh), self.last_s, self.words, self.kinds, place),
         )
 
     def fits(
@@ -96,13 +101,14 @@ def index_document(entries: Sequence[Entry]) -> dict[str, Any]:
 def entry_of(status: CameraStatus, label: Label, now: datetime) -> Entry:
     """The entry of a camera."""
     seen_by = [each.acknowledged_by for each in status.alerts if each.acknowledged_by is not None]
-    source = status.reference.source
+    source, said_at = status.reference.source, _said_at(status.reference)
     return Entry(
         id=status.camera_id,
         label=label,
         shown=shown_as(status.state, status.alerts),
         rank=_rank(status, now),
         waiting=sum(waits(alert, now) for alert in status.alerts),
+        fresh=said_at is not None and now - said_at < UNDO_WITHIN,
         since_s=int(status.since.timestamp()),
         last_s=None if status.last_track_s is None else int(status.last_track_s),
         words=" ".join([*([source] if source else []), *seen_by]),
@@ -126,6 +132,12 @@ def attended_until(status: CameraStatus, now: datetime) -> datetime | None:
     now_s = now.timestamp()
     ends = (to_s for from_s, to_s in status.attended.spans if from_s <= now_s < to_s)
     return next((from_seconds(to_s) for to_s in ends), None)
+
+
+def _said_at(reference: SiteReferenceRecord) -> datetime | None:
+    """When somebody last answered what the camera showed, of which its reference knows."""
+    begun_at = reference.created_at if reference.origin in _BY_ANSWERS else None
+    return max((at for at in (reference.answered_at, begun_at) if at is not None), default=None)
 
 
 def _rank(status: CameraStatus, now: datetime) -> int:

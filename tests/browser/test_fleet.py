@@ -303,7 +303,7 @@ def test_many_are_answered_at_once_said_how_many_and_undone(page, fleet, server)
     page.get_by_label("Choose all that are found").check()
     expect(put_back).to_be_hidden()
     expect(mixed).to_have_text(
-        "Choose them apart to answer them: 2 of 9 are clock faults, 1 has no open alert."
+        "Not every answer fits all: 2 of 9 are clock faults, 1 has no open alert."
     )
     expect(page.get_by_role("button", name="Plan maintenance…")).to_be_visible()
     shoot(page, "fleet-mixed")
@@ -360,3 +360,9 @@ def test_choosing_moves_no_row_and_what_was_acknowledged_is_not_asked_again(page
     expect(page.get_by_role("button", name="They were put back")).to_be_visible()
     expect(page.get_by_role("button", name="Acknowledge")).to_be_hidden()
     shoot(page, "fleet-chosen")
+    expect(page.locator("#bulk [data-bulk=undo]")).to_be_hidden()  # nobody has answered
+    page.locator("#undo").get_by_role("button", name="Undo").click()
+    expect(page.locator("#announce")).to_have_text("Undone: 3 alerts.")
+    expect(page.locator("#due")).to_have_text("3 need a person")
+    assert all(not a["acknowledged"] for a in server.http.get("/alerts").json()["items"])
+    page.get_by_label("Choose Gate 1", exact=True).check()

@@ -11,6 +11,7 @@ const path = (alert, act) => `/alerts/${encodeURIComponent(alert)}/${act}`;
 export async function done(words, what) {
   const answer = await what;
   if (answer === undefined) return undefined;
+  document.querySelector(".undo.toast")?.replaceChildren(); // it would be taken for one of this
   announce(words);
   document.dispatchEvent(new CustomEvent("acted"));
   return answer ?? null;

@@ -18,6 +18,7 @@ const ANSWERED = { status: 409, detail: "state: only a firing alert takes this" 
 /**
  * Offer what all of some items take, each of some `kinds`; says in words why it is no more. `waiting`
  * are an item's alerts that nobody has taken up: nobody is asked to acknowledge one a second time.
+ * `fresh` items may have an answer that can be undone.
  */
 export function offer(bulk, items, noun) {
   bulk.hidden = !items.length;
@@ -29,6 +30,8 @@ export function offer(bulk, items, noun) {
     button.hidden = able < items.length || seen;
     lost ||= able > 0 && able < items.length;
   }
+  const undo = bulk.querySelector('[data-bulk="undo"]');
+  if (undo) undo.hidden = !items.some(({ fresh }) => fresh);
   const answers = bulk.querySelector('[data-bulk="resolve"]:not([hidden])');
   document.getElementById("mixed").textContent = lost || !answers ? mixture(items, lost) : "";
 }
@@ -36,7 +39,7 @@ export function offer(bulk, items, noun) {
 const takes = (kinds, act) => kinds.split(" ").some((kind) => RULE.kinds[kind].takes.includes(act));
 
 /**
- * "Choose them apart to answer them: 2 of 5 are clock faults." All but the most of a kind are named; where none of
+ * "Not every answer fits all: 2 of 5 are clock faults." All but the most of a kind are named; where none of
  * them can be answered, all: "3 of 3 are answered with their tracker."
  */
 function mixture(items, lost) {
@@ -49,8 +52,7 @@ function mixture(items, lost) {
     return at ? _("{n} {are}", said) : _("{n} of {all} {are}", said);
   });
   if (!lost) return items.length ? `${parts.join(", ")}.` : "";
-  const [one] = fewer.length === 1 ? fewer[0].slice(1) : [0];
-  return _n("Choose it apart to answer it: {some}.", "Choose them apart to answer them: {some}.", one, { some: parts.join(", ") });
+  return _("Not every answer fits all: {some}.", { some: parts.join(", ") });
 }
 
 const counted = (n, noun) =>
@@ -59,7 +61,8 @@ const counted = (n, noun) =>
 // --- What is done --------------------------------------------------------------------------------
 
 /** Do an act with all that are chosen: items with a `camera`, an `alert` or both, and a `name`. */
-export async function withMany({ bulk: act, takes: wanted }, items, after) {
+export async function withMany({ bulk: act, takes: wanted }, chosen, after) {
+  const items = act === "acknowledge" ? chosen.filter(({ waiting }) => Number(waiting)) : chosen;
   const outcome = act === "resolve" ? { outcome: wanted } : {};
   const send = async (more) => {
     const targets = OF_ALERTS.includes(act) ? await alertsOf(items, wanted) : items.map((item) => [item.camera, item]);
@@ -88,16 +91,24 @@ async function actOn(act, targets, items, more = {}) {
     const told = await signed("POST", "/acts", { ids: ids.slice(at, at + AT_ONCE), act, ...more });
     if (told === undefined) return undefined;
     for (const { id, problem } of told.items) problems.set(id, problem);
+    if (act === "acknowledge" && more.acknowledged !== false) undo = givenBack(told.items, undo);
     if (told.undo) undo = { ids: [...(undo?.ids ?? []), ...told.undo.ids], until: undo?.until ?? told.undo.until };
   }
   const refused = new Map(items.map((item) => [item, ANSWERED])); // unless something of it was still open
   for (const [, item] of targets) refused.delete(item);
   for (const [id, item] of targets) if (problems.get(id)) refused.set(item, problems.get(id));
   if (items.length === 1 && refused.size) throw new Refused(refused.get(items[0]));
-  sayDone(RULE.done[more.outcome ?? act], items, refused, undo);
+  sayDone(RULE.done[more.acknowledged === false ? "undo" : (more.outcome ?? act)], items, refused, undo);
   document.dispatchEvent(new CustomEvent("acted"));
   return items;
 }
+
+/** What takes an acknowledgement back: by alerts, as long as other answers can be undone. */
+const givenBack = (items, before) => ({
+  ids: [...(before?.ids ?? []), ...items.filter(({ problem }) => !problem).map(({ id }) => id)],
+  until: before?.until ?? new Date(Date.now() + UNDO_MS).toISOString(),
+  by: ["acknowledge", { acknowledged: false }],
+});
 
 /** "Put back: 4 of 6 cameras; 2 were answered meanwhile." */
 function sayDone(word, items, refused, undo) {
@@ -120,28 +131,34 @@ function sayDone(word, items, refused, undo) {
 // --- And undone ----------------------------------------------------------------------------------
 
 const QUIET_MS = 10_000;
+const UNDO_MS = 15 * 60_000; // as of answers (cameras/undo.py)
 const undone = new Map();
 let over = null;
 
 /** True of a camera whose answer was just undone here: that its alert is open again is no news. */
 export const undoneHere = ({ camera_id: camera }) => undone.get(camera) > Date.now();
 
-/** Say what was done, and offer to undo it as long as that is taken; else say it for a while. */
+/**
+ * Say what was done, and offer to undo it as long as that is taken; else say it for a while. What was
+ * offered before goes: its Undo would be taken for one of what was done last.
+ */
 function offerUndo(words, undo) {
-  if (!undo) {
-    announce(words); // an older one can still be undone
-    return;
-  }
   const place = document.getElementById("undo");
   const close = () => place.replaceChildren();
   clearTimeout(over);
+  close();
+  if (!undo) {
+    announce(words);
+    return;
+  }
   announce("");
   const said = document.createElement("span");
   said.textContent = words;
-  const items = undo.ids.map((camera) => ({ camera }));
+  const [act, more] = undo.by ?? ["undo", {}];
+  const items = undo.ids.map((id) => (undo.by ? { alert: id } : { camera: id }));
   const back = async () => {
     for (const id of undo.ids) undone.set(id, Date.now() + QUIET_MS); // events may come before the answer
-    if ((await actOn("undo", items.map((item) => [item.camera, item]), items)) !== undefined) close();
+    await actOn(act, items.map((item, at) => [undo.ids[at], item]), items, more);
   };
   place.replaceChildren(said, buttonOf(_("Undo"), "", back), buttonOf("×", _("Close"), close));
   over = setTimeout(close, Date.parse(undo.until) - Date.now());
@@ -175,5 +192,6 @@ async function alertsOf(items, wanted) {
   }
   return found
     .filter((alert) => of.has(alert.camera_id) && !alert.group_id && RULE.kinds[alert.kind].takes.includes(wanted))
+    .filter((alert) => wanted !== "acknowledge" || !alert.acknowledged)
     .map((alert) => [alert.id, of.get(alert.camera_id)]);
 }

@@ -41,10 +41,10 @@ let wanted = []; // the ids of this page
 const sortable = (name) => name.toLowerCase().replace(/[0-9]+/g, (digits) => digits.padStart(9, "0"));
 
 /** Take a line of the index; a row says its place itself, the index by its number. */
-function note([id, name, state, rank, waiting, since, last, words, kinds, at], told = []) {
+function note([id, name, state, rank, waiting, since, fresh, last, words, kinds, at], told = []) {
   const place = told[at] ?? at;
   const text = () => `${name} ${id} ${WORDS[state]} ${words} ${place}`.toLowerCase();
-  index.set(id, { id, name: sortable(name), state, rank, waiting, since, last, text, kinds, ...placed(place) });
+  index.set(id, { id, name: sortable(name), state, rank, waiting, since, fresh, last, text, kinds, ...placed(place) });
 }
 
 const noteAll = (told) => told.cameras.forEach((line) => note(line, told.places));
@@ -273,6 +273,7 @@ const chosenOnes = () =>
     camera,
     kinds: index.get(camera).kinds,
     waiting: index.get(camera).waiting,
+    fresh: index.get(camera).fresh,
     name: rows.get(camera)?.querySelector(".who a").textContent,
   }));
 

@@ -74,6 +74,9 @@ def test_many_are_answered_at_once_each_for_itself(knocked):
         assert [item["problem"] for item in done["items"]] == [None, None]
         assert done["undo"] is None
     assert all(alert["silenced"] and alert["acknowledged"] for alert in firing(knocked))
+    back = {"ids": two, "act": "acknowledge", "acknowledged": False}
+    knocked.post("/acts", json=back).raise_for_status()
+    assert not any(alert["acknowledged"] for alert in firing(knocked))
     body = {"ids": ["c00", "c01"], "act": "maintenance", "to": until}
     assert [i["problem"] for i in knocked.post("/acts", json=body).json()["items"]] == [None] * 2
     assert len(knocked.get("/cameras/c01/maintenance").json()["items"]) == 1
