@@ -182,7 +182,7 @@ def _ridged(covariance: Array) -> Array:
     return np.asarray(covariance + ridge + 1e-9 * np.eye(4))
 
 
-_FEWEST_USUAL = 2  # groups of which a scatter is known
+FEWEST_USUAL = 2  # groups of which a scatter is known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,7 +195,7 @@ class UsualFit:
 
     def has_changed(self, fits: Array) -> bool:
         """True if walking groups (P,) fit so much worse that the paths must have changed."""
-        if not fits.size or self.walking_groups < _FEWEST_USUAL:
+        if not fits.size or self.walking_groups < FEWEST_USUAL:
             return False
         sd = self.sd * float(np.sqrt(1 / fits.size + 1 / self.walking_groups))
         limit = -value_below(config.CHANGED_RATE, self.walking_groups - 1) * sd

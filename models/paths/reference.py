@@ -18,7 +18,13 @@ from models.paths.density_map import PathDensityMap, of_levels, to_levels
 from models.paths.folds import ChosenBandwidths, CrossFit, Folds, cross_fit, fold_maps
 from models.paths.likelihood import PathModel, walkers_of
 from models.paths.map_learning import path_model_of
-from models.paths.path_tests import StillScores, UsualFit, learn_scores, usual_fit
+from models.paths.path_tests import (
+    FEWEST_USUAL,
+    StillScores,
+    UsualFit,
+    learn_scores,
+    usual_fit,
+)
 from models.paths.registration import Shape
 from models.serialization import Format, flattened, from_bytes, restored, to_bytes, under
 from models.tracks.observations import Observations
@@ -88,7 +94,9 @@ def learn_paths(
     weights: Array | None = None,
     folds: Folds | None = None,
 ) -> PathReference | None:
-    """The paths of tracks at the prior pose; None where fewer than 12 walking groups walk.
+    """The paths of tracks at the prior pose.
+
+    None where fewer than 12 walking groups walk, or where the map of some tells nothing of others.
 
     A map knows the tracks that it is made of too well. So each quarter of the walking groups is
     held against a map of the others: what their scores are on average is the bias, how much more
@@ -104,6 +112,8 @@ def learn_paths(
     if folds is None:
         return None
     crossed = cross_fit(folds.each, at)
+    if crossed.fits.size < FEWEST_USUAL or not np.ptp(crossed.slopes, axis=0).any():
+        return None
     inflation, scatter = _scatter(crossed)
     parts_bent = float(np.trace(np.linalg.solve(scatter, crossed.curvature)))
     count = float(crossed.people.sum())

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from models.geometry.pose import array_of
@@ -9,7 +10,7 @@ from models.paths import folds
 from models.paths.folds import fold_maps
 from models.paths.reference import learn_paths, paths_from_bytes, paths_to_bytes
 from models.pose import learn_site
-from models.tracks.trajectory import by_end
+from models.tracks.trajectory import Trajectory, by_end
 from tests.models.sites import LENS, PRIOR, seen, tracks_of
 
 AT = array_of(PRIOR)
@@ -72,3 +73,17 @@ def test_they_are_chosen_anew_when_people_may_walk_elsewhere(
     found = fold_maps(known, LENS, AT, 0, chosen=before)
     assert bool(asked) == anew
     assert found.chosen == (chosen if anew else before)
+
+
+def test_people_of_whom_none_tells_where_the_others_are_leave_no_paths():
+    """All scores were zero, no Cholesky factor was found, and the camera's look failed."""
+    rng = np.random.default_rng(0)
+    offset_s = np.array([0.0, 1e-3, 2e-3, 1.0, 2.0])
+    standing = []
+    for begin_s in np.sort(rng.uniform(0, HOUR_S, 60)):
+        uv = np.array([640.0, 504.0]) + rng.normal(0, 1, 2) + rng.normal(0, 0.5, (5, 2))
+        uv[0, 1] -= 40.0
+        standing.append(Trajectory(time_s=begin_s + offset_s, uv=uv))
+    observed = seen(standing)
+    assert learn_paths(observed, LENS, PRIOR, 0) is None
+    assert learn_site(observed, LENS, PRIOR, chart=False).paths is None
