@@ -208,8 +208,10 @@ def _far_table(cases: _Cases) -> str:
         if own:
             told = [o for o in own if o.state == "drifting" and o.parameters[3].identifiable]
             off = np.abs([o.parameters[3].error for o in told])
-            cell = f"{np.median(off):.1f} ({np.quantile(off, 0.9):.1f}, {off.max():.0f})"
-            lines.append(_row(f"±{size}", len(own), *_states(own), cell if told else "-"))
+            cell = "-"
+            if told:
+                cell = f"{np.median(off):.1f} ({np.quantile(off, 0.9):.1f}, {off.max():.0f})"
+            lines.append(_row(f"±{size}", len(own), *_states(own), cell))
     return f"**Far pans**, by {_ENOUGH} people and more:\n\n" + "\n".join(lines)
 
 

@@ -136,6 +136,14 @@ def test_few_tracks_far_pans_and_how_reliable_moved_was(tmp_path):
     assert f"| 0.9 to 1.0 | 3 | 1 | {would:.1f} | 0.20 | {mean:.2f} |" in said
 
 
+def test_far_pans_of_which_none_was_told_have_a_row(tmp_path):
+    """The quantile of nothing ended the study after all of its cases."""
+    far = replace(CASE, table=Table.FAR, knock="pan+90")
+    rows = [CaseResult(case_id=far, outcome=replace(SERVED, state="unsure", moved=0.93))]
+    said = all_tables(OutcomeFile(tmp_path / "p.jsonl").heading, rows)
+    assert "| ±90 | 1 | 0 | 0 | 0 | 1 | 0 | - |" in said
+
+
 def test_names_are_counted_beside_the_right_ones(tmp_path):
     kept = OutcomeFile(tmp_path / "p.jsonl")
     slow = replace(CASE, table=Table.NAMES, fault="slow-clock-later")
