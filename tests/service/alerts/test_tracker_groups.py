@@ -324,7 +324,7 @@ def test_its_pages_have_words_of_its_own_and_its_members_lead_to_it(town):
     assert "It is answered with 3 cameras of bytetrack" in page
     assert "<summary>This camera apart</summary>" in page
     (line,) = [e for e in town.http.get("/ui/fleet/index").json()["cameras"] if e[0] == "c0"]
-    assert line[8] == "member"
+    assert line[9] == "member"
 
 
 def test_who_hears_of_moves_alone_hears_of_a_group_that_speaks_for_them(town):
