@@ -15,8 +15,8 @@ from collections.abc import Iterator
 from typing import Any
 
 _MANY = 5_000
-# New objects until they are looked at, and how often until all are: 700 cost a page of 2,000 cameras
-# a tenth; of full collections there are as many as by Python's own 700, 10, 10.
+# New objects until they are looked at, and how often until all are. Python's own 700 cost a page of
+# 2,000 cameras a tenth; full collections are as many as by its 700, 10, 10.
 _NEW = 10_000, 2, 2
 _MOST_TIMES = 10
 
