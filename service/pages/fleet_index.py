@@ -69,7 +69,7 @@ class Entry:
         )
 
     def fits(
-        self, states: Collection[str], words: Iterable[str], site: str, tags: Iterable[str]
+        self, states: Collection[str], words: Collection[str], site: str, tags: Iterable[str]
     ) -> bool:
         """True of one of some states and of a site, if any are named, with all words and tags."""
         own = self.label
@@ -77,13 +77,13 @@ class Entry:
             (not states or self.shown in states)
             and (not site or own.site == site or own.site.startswith(f"{site}/"))
             and set(tags) <= set(own.tags)
-            and all(word in self._text for word in words)
+            and (not words or self._has(words))
         )
 
-    @property
-    def _text(self) -> str:
+    def _has(self, words: Collection[str]) -> bool:
         state, own = _(STATES[self.shown]), self.label
-        return f"{own.name} {self.id} {state} {self.words} {own.place}".casefold()
+        text = f"{own.name} {self.id} {state} {self.words} {own.place}".casefold()
+        return all(word in text for word in words)
 
 
 def sortable(name: str) -> str:

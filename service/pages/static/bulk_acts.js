@@ -147,7 +147,7 @@ function offerUndo(words, undo) {
   const close = () => place.replaceChildren();
   clearTimeout(over);
   close();
-  if (!undo) {
+  if (!undo?.ids.length) {
     announce(words);
     return;
   }
