@@ -5,6 +5,7 @@ from array import array
 from dataclasses import dataclass, field
 from functools import partial
 from io import BytesIO, TextIOWrapper
+from itertools import islice, repeat
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from service.formats.track import (
 )
 
 MAX_LINES = 500_000  # some seconds of reading
-_CHECKED_EVERY = 1_000  # lines
+_BLOCK = 1_000  # lines that are read at once
 MAX_LINE_CHARS = 1_000  # ten numbers need 200
 _MOST_IDS = 4 * MAX_TRACKS  # those of cars among them
 _LEAST_CELLS = 6  # frame, id, left, top, width, height
@@ -140,12 +141,15 @@ def _read_lines(body: bytes) -> _Lines:
         )
     lines = _Lines()
     text = TextIOWrapper(BytesIO(body), encoding="utf-8", errors="replace")
-    for line_no, line in enumerate(text, start=1):
-        if line_no % _CHECKED_EVERY == 0:
-            check_effort()
-        if line.isspace() or (line_no == 1 and line.lower().startswith("frame")):
-            continue
-        _read_line(lines, line_no, line)
+    first_no = 1
+    while block := list(islice(text, _BLOCK)):
+        check_effort()
+        if not _read_even(lines, block):
+            for line_no, line in enumerate(block, start=first_no):
+                if line.isspace() or (line_no == 1 and line.lower().startswith("frame")):
+                    continue
+                _read_line(lines, line_no, line)
+        first_no += len(block)
         if len(lines.names) > _MOST_IDS:
             raise TooLargeError(f"ids: at most {_MOST_IDS} of all classes are taken, got more")
         if len(lines.broken) > MAX_TRACKS:
@@ -153,6 +157,31 @@ def _read_lines(body: bytes) -> _Lines:
                 check_count(len(lines.broken))
             break
     return lines
+
+
+def _read_even(lines: _Lines, block: list[str]) -> bool:
+    """Read a block of lines at once, twice as fast, where all are right and have as many cells.
+
+    False where they are not, and none of them was read.
+    """
+    commas = set(map(str.count, block, repeat(",")))
+    count = min(commas) + 1
+    if len(commas) > 1 or count < _LEAST_CELLS or max(map(len, block)) > MAX_LINE_CHARS:
+        return False
+    names = [line.split(",", 2)[1].strip()[:MAX_ID_LENGTH] for line in block]
+    columns = [at for at in range(min(count, _READ_CELLS)) if at != 1]
+    numbers = np.full((len(block), len(_NONE)), np.nan)
+    try:
+        read = np.loadtxt(block, delimiter=",", usecols=columns, comments=None, ndmin=2)
+    except ValueError:
+        return False
+    if len(read) < len(block) or not all(names):
+        return False
+    numbers[:, : len(columns)] = read
+    lines.tracks.extend(lines.names.setdefault(name, len(lines.names)) for name in names)
+    lines.cells.extend([count] * len(block))
+    lines.numbers.frombytes(numbers.tobytes())
+    return True
 
 
 def _read_line(lines: _Lines, line_no: int, line: str) -> None:

@@ -103,6 +103,25 @@ def test_malformed_text_costs_only_its_own_track(corner, settings):
     assert [record.track_id for record in stored(settings)] == ["1"]
 
 
+@pytest.mark.parametrize("wrong", ["", "x", "1_0", "1,2", '"3"', "1" * 1_001])
+def test_lines_that_are_alike_are_read_as_one_by_one(monkeypatch, wrong):
+    text = [*walk("007", "1.0,-1,-1,-1"), *walk("b c", "0.9,-1,-1,ten", count=4)]
+    text += ["9,7,1,1,9,9,1,-1,-1,-1".replace("9", wrong or "9", 1)]
+    read = {}
+    for block in (1, 3, 1_000):
+        monkeypatch.setattr(mot, "_BLOCK", block)
+        read[block] = mot._read_lines("\n".join(text).encode())
+    one = read[1_000]
+    for other in read.values():
+        assert (other.names, other.broken) == (one.names, one.broken)
+        assert (other.tracks, other.cells) == (one.tracks, one.cells)
+        assert np.array_equal(other.numbers, one.numbers, equal_nan=True)
+    monkeypatch.setattr(mot, "_read_even", lambda *_: False)
+    alone = mot._read_lines("\n".join(text).encode())
+    assert np.array_equal(alone.numbers, one.numbers, equal_nan=True)
+    assert (alone.names, alone.broken) == (one.names, one.broken)
+
+
 def test_a_text_of_too_many_lines_is_refused_before_it_is_read(corner, monkeypatch):
     monkeypatch.setattr(mot, "MAX_LINES", 5)
     answer = send(corner, walk("7", count=7), frame_rate_hz="25")
