@@ -10,6 +10,7 @@ import time
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
+import msgspec
 from sqlalchemy import Connection, Engine, create_engine, event, text
 from sqlalchemy.exc import DBAPIError, InvalidatePoolError, SQLAlchemyError
 
@@ -104,6 +105,7 @@ def postgresql_engine(url: str, patience_s: float, connections: int) -> Engine:
     """An engine whose connections are tried before they are used, and wait for locks so long."""
     engine = create_engine(
         url,
+        json_deserializer=msgspec.json.decode,
         pool_size=connections,
         max_overflow=0,
         pool_timeout=patience_s,

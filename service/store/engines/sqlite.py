@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from sqlalchemy import (
     ClauseElement,
     Connection,
@@ -276,7 +277,12 @@ def sqlite_engine(url: str, patience_s: float, connections: int) -> Engine:
     # All are kept once they were needed: to open one takes six statements, and to close one more.
     # The one that was given back last goes out first, so that few have pages in their caches.
     engine = create_engine(
-        url, pool_size=connections, max_overflow=0, pool_timeout=patience_s, pool_use_lifo=True
+        url,
+        json_deserializer=msgspec.json.decode,
+        pool_size=connections,
+        max_overflow=0,
+        pool_timeout=patience_s,
+        pool_use_lifo=True,
     )
 
     @event.listens_for(engine, "connect")
