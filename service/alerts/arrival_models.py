@@ -142,11 +142,8 @@ def save_arrival_model(
 def arrival_model_of(session: Session, camera_id: str) -> ArrivalModel | None:
     """The arrival model of a camera; None where too little of it is known."""
     profile = cameras.arrival_profile(session, camera_id)
-    return None if profile is None else unpacked(profile)
-
-
-def unpacked(profile: dict[str, Any]) -> ArrivalModel:
-    """An arrival model as it was stored."""
+    if profile is None:
+        return None
     numbers = {**profile["rhythm"], "rates": tuple(profile["rhythm"]["rates"])}
     return ArrivalModel(rhythm=ArrivalProcess(**numbers), delay_s=profile["delay_s"])
 

@@ -62,16 +62,23 @@ def data_gap_of(
 
 
 def is_no_data(
-    settings: Settings, known: ArrivalModel | None, last_s: float | None, now: datetime
+    settings: Settings,
+    last_s: float | None,
+    now: datetime,
+    usual_gap_s: float | None = None,
+    delay_s: float | None = None,
 ) -> bool:
-    """True where a camera whose newest track ended then has been silent for too long to be ok."""
+    """True where a camera whose newest track ended then has been silent for too long to be ok.
+
+    A usual gap, and how late tracks come at the most, are of its arrival model, if it has one.
+    """
     if last_s is None or now.timestamp() - last_s < settings.no_data_min_s:
         return False
     limit_s = settings.no_data_after_h * HOUR_S
-    if known is None:
+    if usual_gap_s is None or delay_s is None:
         return now.timestamp() - last_s > limit_s
-    gap_s = max(_GAPS * known.rhythm.usual_gap_s, settings.no_data_min_s)
-    return now.timestamp() - known.delay_s - last_s > min(gap_s, _STATE_BY_S, limit_s)
+    gap_s = max(_GAPS * usual_gap_s, settings.no_data_min_s)
+    return now.timestamp() - delay_s - last_s > min(gap_s, _STATE_BY_S, limit_s)
 
 
 def watch_data_gap(
@@ -118,7 +125,7 @@ def _by_the_limit(
         severity = Severity.WARNING if now.timestamp() - begun_s > limit_s else None
     return DataGap(
         last_s=last_s,
-        no_data=is_no_data(settings, None, last_s, now),
+        no_data=is_no_data(settings, last_s, now),
         reasons=(
             Reason(
                 code=ServiceCode.SILENT_UNKNOWN,
@@ -165,7 +172,7 @@ def _by_arrivals(
         values["late_s"] = known.delay_s
     return DataGap(
         last_s=last_s,
-        no_data=is_no_data(settings, known, last_s, now),
+        no_data=is_no_data(settings, last_s, now, rhythm.usual_gap_s, known.delay_s),
         reasons=(Reason(code=code, values=values),),
         severity=_SEVERITIES[verdict],
     )

@@ -13,7 +13,6 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from models.monitoring.verdict import Drift
-from service.alerts.arrival_models import unpacked
 from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Cause, Origin, PoseState, Severity
 from service.references import Attendance, attendance_by, made_against
@@ -91,13 +90,12 @@ def camera_statuses(
     before = fleet.newest_identifiable_estimates(session, without) if without else {}
     found = {}
     for camera_id, each in newest.items():
-        arrivals = None if each.rhythm is None else unpacked(each.rhythm)
         found[camera_id] = _status_of(
             each,
             before.get(camera_id) if camera_id in without else each.estimate,
             attendance_by(windows.get(camera_id, []), now),
             sorted(firing[camera_id], key=lambda alert: _urgency(alert, now)),
-            silent=is_no_data(settings, arrivals, each.last_track_s, now),
+            silent=is_no_data(settings, each.last_track_s, now, each.usual_gap_s, each.delay_s),
             now=now,
         )
     return found

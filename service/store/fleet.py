@@ -47,15 +47,17 @@ class Newest:
     """The newest rows of a camera, and signs of more to know.
 
     The reference that counts comes without the site itself, and of several cameras the estimate
-    without what is behind it. `last_track_s` is when the newest track ended of those that count.
-    `fires` says that an alert does, `attended` that there are maintenance windows, `assumed` that
-    nobody has agreed to its prior pose.
+    without what is behind it. `last_track_s` is when the newest track ended of those that count,
+    `usual_gap_s` and `delay_s` are of the arrival model, if there is one. `fires` says that an
+    alert does, `attended` that there are maintenance windows, `assumed` that nobody has agreed to
+    its prior pose.
     """
 
     reference: SiteReferenceRecord
     estimate: EstimateRecord | None
     last_track_s: float | None
-    rhythm: dict[str, Any] | None
+    usual_gap_s: float | None
+    delay_s: float | None
     fires: bool
     attended: bool
     assumed: bool
@@ -72,12 +74,13 @@ def newest(session: Session, ids: Ids = None, *, lean: bool = False) -> dict[str
             reference=reference,
             estimate=None if estimate is None or estimate.id is None else estimate,
             last_track_s=ended_s,
-            rhythm=profile or None,
+            usual_gap_s=gap_s,
+            delay_s=delay_s,
             fires=bool(fires),
             attended=bool(attended),
             assumed=origin == Origin.ASSUMED,
         )
-        for camera_id, reference, estimate, ended_s, profile, fires, attended, origin in (
+        for camera_id, reference, estimate, ended_s, gap_s, delay_s, fires, attended, origin in (
             session.execute(query, given(ids))
         )
     }
@@ -138,7 +141,9 @@ def _newest(*, some: bool, whole: bool, lean: bool) -> Select[Any]:
             CameraRecord.id,
             *(_LEAN if lean else (SiteReferenceRecord, EstimateRecord)),
             last.correlate(CameraRecord).scalar_subquery(),
-            RhythmRecord.profile,
+            # Two numbers of some fifty.
+            RhythmRecord.profile["rhythm", "usual_gap_s"].as_float(),
+            RhythmRecord.profile["delay_s"].as_float(),
             fires.correlate(CameraRecord),
             attended.correlate(CameraRecord),
             PriorPoseRecord.origin,

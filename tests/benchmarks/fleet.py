@@ -11,14 +11,19 @@ import statistics
 import sys
 import tempfile
 import time
+from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
+from sqlalchemy import select
 
+from models.monitoring.arrivals import CELLS, ArrivalProcess
 from service.cameras.status import camera_statuses
 from service.commands.migrate import migrate
 from service.enums import PoseState
 from service.settings import Settings
+from service.store.cameras import CameraRecord, RhythmRecord
 from tests.benchmarks.parts.cloned import clone
 from tests.running import RunningService, free_port
 from tests.service.fleet_bench import Fleet, afternoon
@@ -72,6 +77,19 @@ def alerts(page: Page, fleet: Fleet) -> None:
     say(f"an alert shows after {statistics.median(delays):.2f} s, at the worst {max(delays):.2f} s")
 
 
+def _know_hours(fleet: Fleet) -> None:
+    """Every camera knows when people come, as after a week: a page asks that for each."""
+    now = datetime.now(UTC)
+    counts = {"tracks": {str(480_000 + hour): 20 for hour in range(28 * 24)}, "latest_s": {}}
+    rates = [20 / (3 + hour) for hour in range(CELLS)]
+    process = ArrivalProcess(rates=tuple(rates), burst=1.5, shape=4.0, usual_gap_s=3_600.0, days=14)
+    profile = {"rhythm": asdict(process), "delay_s": 5.0}
+    with fleet.store.write() as session:
+        for camera_id in session.scalars(select(CameraRecord.id)).all():
+            known = {"profile": profile, "counts": counts, "learned_at": now}
+            session.add(RhythmRecord(camera_id=camera_id, **known))
+
+
 def _steady(fleet: Fleet) -> list[str]:
     with fleet.store.read() as session:
         statuses = camera_statuses(session, fleet.settings)
@@ -91,6 +109,7 @@ def main() -> None:
         migrate(settings)
         fleet = Fleet(settings)
         afternoon(fleet, min(given.cameras, _SEEDED))
+        _know_hours(fleet)
         if given.cameras > _SEEDED:
             copies = [f"copy-{n}" for n in range(given.cameras - _SEEDED)]
             clone(settings.database_path, _steady(fleet), copies)
