@@ -131,21 +131,33 @@ def read_track_text(text: bytes | Raw, *, stand_ins: bool = False) -> Any:
         ValueError: it is no JSON.
         RecursionError: it is nested too deeply.
     """
-    name = None
+    size = len(memoryview(text))
+    if size > MAX_TRACK_BYTES:
+        words = f"a track of at most {MAX_TRACK_BYTES} bytes is taken, got {size}"
+        name = _name_of(text, stand_ins=stand_ins)
+        return UnreadableTrack(id=name, code="too_many_points", detail=words)
     try:
-        name = _decode(text, _Named).id
-        if isinstance(name, str) and stand_ins:
-            name = _with_words(name.encode()).decode()
-        size = len(memoryview(text))
-        if size > MAX_TRACK_BYTES:
-            words = f"a track of at most {MAX_TRACK_BYTES} bytes is taken, got {size}"
-            return UnreadableTrack(id=name, code="too_many_points", detail=words)
         track, unknown = _decode_naming(text, _KnownTrack, _Track)
     except msgspec.ValidationError as error:
-        return _unreadable(name, str(error))
+        return _unreadable(_name_of(text, stand_ins=stand_ins), str(error))
     rows = {form: found for form in _FORMS if (found := getattr(track, form)) is not UNSET}
     given = {"size": track.size, "normalised": track.normalised}
+    name = _as_given(track.id, stand_ins=stand_ins)
     return {"id": name, "class": track.kind, **given, **rows, **unknown}
+
+
+def _name_of(text: bytes | Raw, *, stand_ins: bool) -> str | int | None:
+    """The id of a track of which nothing else can be read; None where not even that."""
+    try:
+        return _as_given(_decode(text, _Named).id, stand_ins=stand_ins)
+    except msgspec.ValidationError:
+        return None
+
+
+def _as_given(name: str | int | None, *, stand_ins: bool) -> str | int | None:
+    if isinstance(name, str) and stand_ins:
+        return _with_words(name.encode()).decode()
+    return name
 
 
 def _decode(text: bytes | Raw, kind: type[_Kind]) -> _Kind:

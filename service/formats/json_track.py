@@ -1,6 +1,7 @@
 """One track of a JSON body: what its forms say, and which number of it is wrong."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -99,14 +100,16 @@ def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
     if (plain := plain_rows(value, taken)) is not None:
         return plain
     columns = taken[0]
-    for at, row in enumerate(value):
-        if not at and isinstance(row, _LIST) and len(row) in taken:
-            columns = len(row)
-        if not isinstance(row, _LIST) or len(row) != columns:
-            needed = str(columns) if at else " or ".join(map(str, taken))
-            if isinstance(row, _LIST) and len(row) in taken:
-                needed += ", as in the first point: all points carry a head or none,"
-            refuse(f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}")
+    if value and isinstance(value[0], _LIST) and len(value[0]) in taken:
+        columns = len(value[0])
+    odd = np.fromiter(_lengths(value), dtype=np.int64, count=len(value)) != columns
+    if odd.any():
+        at = int(np.argmax(odd))
+        row = value[at]
+        needed = str(columns) if at else " or ".join(map(str, taken))
+        if isinstance(row, _LIST) and len(row) in taken:
+            needed += ", as in the first point: all points carry a head or none,"
+        refuse(f"{form}/{at}: {needed} numbers are needed, got {row!r:.80}")
     for index, number in enumerate(chain.from_iterable(value)):
         if type(number) is float and -LARGEST < number < LARGEST:
             continue
@@ -120,6 +123,13 @@ def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:
                 "not_finite", f"{form}/{at}: finite numbers are needed, got {number!r:.40}"
             )
     return np.array(value, dtype=np.float64).reshape(-1, columns)
+
+
+def _lengths(rows: list[Any]) -> Iterable[int]:
+    """The lengths of rows, -1 of one that is none."""
+    if set(map(type, rows)) <= set(_LIST):
+        return map(len, rows)
+    return (len(row) if isinstance(row, _LIST) else -1 for row in rows)
 
 
 def plain_rows(value: list[Any], lengths: tuple[int, ...]) -> Array | None:
