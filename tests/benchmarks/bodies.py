@@ -5,12 +5,13 @@ and the longest wait of `/healthz` meanwhile. No process may take more than `--l
 """
 
 import argparse
+import multiprocessing
 import resource
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
@@ -20,11 +21,13 @@ from rich.table import Table
 
 from service.commands.migrate import migrate
 from service.settings import Settings
+from tests.benchmarks.parts.health_probe import answer_at_once, probe_health
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
 
 SIZE = 32 * 2**20
 JSON, NDJSON, CSV = "application/json", "application/x-ndjson", "text/csv"
+_EVERY_S = 0.02
 _QUERY = "?frame_rate_hz=25&started_at=2026-11-01T00:00:00Z"
 
 
@@ -109,35 +112,37 @@ def memory_mb(pid: int) -> float:
     return sum(peaks)
 
 
-def healthz_ms(url: str, until: threading.Event, waits: list[float]) -> None:
-    """Ask for `/healthz` by a connection of its own until told to stop."""
-    with httpx.Client(base_url=url, timeout=120) as http:
-        while not until.wait(0.02):
-            begun = time.perf_counter()
-            try:
-                http.get("/healthz")
-            except httpx.HTTPError:
-                waits.append(float("inf"))
-                return
-            waits.append((time.perf_counter() - begun) * 1e3)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """The cost of a body: its answer, memory in MB of the API before and at its peak.
+
+    Of the longest wait of `/healthz`, what a server waited just after that has nothing to do.
+    """
+
+    answer: str
+    took_s: float
+    before_mb: float
+    peak_mb: float
+    health_ms: float
+    idle_ms: float
 
 
-def measure(
-    folder: Path, limit_mb: int, kind: str, body: bytes
-) -> tuple[str, float, float, float, float]:
-    """The answer, its seconds, memory in MB before and at its peak, the longest wait in ms."""
+def measure(folder: Path, limit_mb: int, kind: str, body: bytes, idle_port: int) -> Cost:
+    """Post a body to a service of its own, and ask from another process how it is meanwhile."""
     settings = Settings(data_dir=folder / "data", workers=0, port=free_port())
     migrate(settings)
-    running = RunningService(settings)
+    running, context = RunningService(settings), multiprocessing.get_context("spawn")
     running.start()
+    stop, begun, (mine, theirs) = context.Event(), context.Event(), context.Pipe()
+    asked = (settings.port, idle_port, stop, theirs, _EVERY_S, begun)
+    prober = context.Process(target=probe_health, args=asked, daemon=True)
     try:
         running.http.post("/cameras", json={**CAMERA, "id": "c0"}).raise_for_status()
         limit = limit_mb * 2**20
         resource.prlimit(running.process.pid, resource.RLIMIT_AS, (limit, limit))
-        before, done, waits = memory_mb(running.process.pid), threading.Event(), [0.0]
-        watch = threading.Thread(target=healthz_ms, args=(running.url, done, waits))
-        watch.start()
-        begun = time.perf_counter()
+        prober.start()
+        begun.wait()
+        before_mb, begun_s = memory_mb(running.process.pid), time.perf_counter()
         try:
             answer = httpx.post(
                 f"{running.url}/cameras/c0/tracks{_QUERY}",
@@ -146,10 +151,18 @@ def measure(
             said = f"{answer.status_code} {answer.text[-70:]}" if answer.is_error else "202"
         except httpx.HTTPError as error:
             said = type(error).__name__
-        took_s = time.perf_counter() - begun
-        done.set()
-        watch.join()
-        return said, took_s, before, memory_mb(running.process.pid), max(waits)
+        took_s = time.perf_counter() - begun_s
+        stop.set()
+        worst = max(mine.recv(), key=lambda probe: probe.health_s)
+        prober.join()
+        return Cost(
+            answer=said,
+            took_s=took_s,
+            before_mb=before_mb,
+            peak_mb=memory_mb(running.process.pid),
+            health_ms=1e3 * worst.health_s,
+            idle_ms=1e3 * worst.idle_s,
+        )
     finally:
         running.kill()
 
@@ -160,15 +173,22 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="of bodies; all of them if none is given")
     parser.add_argument("--limit-mb", type=int, default=6_000)
     asked = parser.parse_args()
-    table = Table("body", "answer", "s", "MB before", "MB peak", "/healthz ms")
-    for name, (kind, made) in BODIES.items():
-        if asked.names and name not in asked.names:
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            found = measure(Path(folder), asked.limit_mb, kind, made())
-        said, took_s, before, peak, wait_ms = found
-        sys.stderr.write(f"{name}: {said} {took_s:.1f} s {peak:.0f} MB {wait_ms:.0f} ms\n")
-        table.add_row(name, said, f"{took_s:.2f}", f"{before:.0f}", f"{peak:.0f}", f"{wait_ms:.0f}")
+    table = Table("body", "answer", "s", "MB before", "MB peak", "/healthz ms", "idle ms")
+    idle_port = free_port()
+    idle = multiprocessing.get_context("spawn").Process(target=answer_at_once, args=(idle_port,))
+    idle.start()
+    try:
+        for name, (kind, made) in BODIES.items():
+            if asked.names and name not in asked.names:
+                continue
+            with tempfile.TemporaryDirectory() as folder:
+                cost = measure(Path(folder), asked.limit_mb, kind, made(), idle_port)
+            numbers = (cost.took_s, cost.before_mb, cost.peak_mb, cost.health_ms, cost.idle_ms)
+            row = [f"{number:.2f}" if number < 10 else f"{number:.0f}" for number in numbers]
+            sys.stderr.write(f"{name}: {cost.answer} {' '.join(row)}\n")
+            table.add_row(name, cost.answer, *row)
+    finally:
+        idle.terminate()
     Console().print(table)
 
 

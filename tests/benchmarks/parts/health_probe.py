@@ -34,8 +34,15 @@ class Probe:
     idle_s: float
 
 
-def probe_health(port: int, idle_port: int, stop: Event, pipe: Pipe) -> None:
-    """Ask for /healthz ten times a second, from a process of its own."""
+def probe_health(
+    port: int,
+    idle_port: int,
+    stop: Event,
+    pipe: Pipe,
+    every_s: float = 0.1,
+    begun: Event | None = None,
+) -> None:
+    """Ask for /healthz ten times a second, from a process of its own; `begun` is set then."""
     # Else it looks once through all that it has imported, and that would be the server's delay.
     gc.freeze()
 
@@ -50,10 +57,12 @@ def probe_health(port: int, idle_port: int, stop: Event, pipe: Pipe) -> None:
         while (await idle.ask("GET", "/")).status != 200:  # it is being started
             await asyncio.sleep(0.05)
         first = time.perf_counter()
+        if begun is not None:
+            begun.set()
         while not stop.is_set():
             at_s = time.perf_counter() - first
             taken.append(Probe(at_s, await seconds(health), await seconds(idle)))
-            await asyncio.sleep(0.1)
+            await asyncio.sleep(every_s)
         return taken
 
     pipe.send(asyncio.run(probe()))
