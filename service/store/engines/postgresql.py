@@ -10,9 +10,10 @@ import time
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-import msgspec
-from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy import Connection, Engine, event, text
 from sqlalchemy.exc import DBAPIError, InvalidatePoolError, SQLAlchemyError
+
+from service.store.engines.pooled import pooled_engine
 
 # The first key of our advisory locks; the second tells what is locked.
 LOCKS = 0x5F007
@@ -103,15 +104,7 @@ def wait_for(connection: Connection, about: str) -> None:
 
 def postgresql_engine(url: str, patience_s: float, connections: int) -> Engine:
     """An engine whose connections are tried before they are used, and wait for locks so long."""
-    engine = create_engine(
-        url,
-        json_deserializer=msgspec.json.decode,
-        pool_size=connections,
-        max_overflow=0,
-        pool_timeout=patience_s,
-        pool_use_lifo=True,
-        connect_args=_LIVELINESS,
-    )
+    engine = pooled_engine(url, patience_s, connections, connect_args=_LIVELINESS)
 
     @event.listens_for(engine, "connect")
     def prepare(connection: Any, _: Any) -> None:

@@ -10,7 +10,6 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from sqlalchemy import (
     ClauseElement,
     Connection,
@@ -19,7 +18,6 @@ from sqlalchemy import (
     Engine,
     Executable,
     Select,
-    create_engine,
     event,
     make_url,
     text,
@@ -30,6 +28,7 @@ from sqlalchemy.sql.compiler import SQLCompiler
 
 from service.data_dir import make_file
 from service.errors import OverloadedError
+from service.store.engines.pooled import pooled_engine
 
 
 class Turns:
@@ -274,16 +273,7 @@ def _busy_timeout(patience_s: float) -> str:
 
 def sqlite_engine(url: str, patience_s: float, connections: int) -> Engine:
     """An engine of a file in WAL mode with foreign keys on and writers that wait."""
-    # All are kept once they were needed: to open one takes six statements, and to close one more.
-    # The one that was given back last goes out first, so that few have pages in their caches.
-    engine = create_engine(
-        url,
-        json_deserializer=msgspec.json.decode,
-        pool_size=connections,
-        max_overflow=0,
-        pool_timeout=patience_s,
-        pool_use_lifo=True,
-    )
+    engine = pooled_engine(url, patience_s, connections)
 
     @event.listens_for(engine, "connect")
     def prepare(connection: Any, _: Any) -> None:
