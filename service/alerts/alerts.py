@@ -206,30 +206,23 @@ def activity_of_alert(session: Session, alert_id: str) -> Sequence[ActivityRecor
     return [entry for entry in entries if entry.what != Activity.ALERT_OPENED]
 
 
-def acknowledge_alert(session: Session, alert_id: str, by: str | None) -> AlertRecord:
-    """Note who has seen an alert; the first one stays.
+def acknowledge_alert(
+    session: Session, alert_id: str, by: str | None, *, acknowledged: bool = True
+) -> AlertRecord:
+    """Note who has seen an alert, the first one stays; else it waits for a person again.
 
     Raises:
         NotFoundError: there is none of that id.
         ConflictError: it is resolved.
     """
     record = require_firing(session, alert_id)
-    if record.acknowledged_at is None:
+    if acknowledged == (record.acknowledged_at is not None):
+        return record
+    if acknowledged:
         record.acknowledged_by = by or "someone"
         record.acknowledged_at = datetime.now(UTC)
         note_on_alert(session, record, AlertActivity.ACKNOWLEDGED, record.acknowledged_by)
-    return record
-
-
-def give_back(session: Session, alert_id: str, by: str | None) -> AlertRecord:
-    """Have an alert that somebody acknowledged wait for a person again.
-
-    Raises:
-        NotFoundError: there is none of that id.
-        ConflictError: it is resolved.
-    """
-    record = require_firing(session, alert_id)
-    if record.acknowledged_at is not None:
+    else:
         record.acknowledged_by = record.acknowledged_at = record.escalated_at = None
         note_on_alert(session, record, AlertActivity.GIVEN_BACK, by)
     return record

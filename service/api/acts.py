@@ -129,8 +129,8 @@ def _undoable(session: Session, one: str, act: Act, begun: datetime) -> dict[str
 
 
 def _acknowledge(session: Session, state: AppState, one: str, body: ActsBody) -> None:
-    noted = alerts.acknowledge_alert if body.acknowledged else alerts.give_back
-    noted(session, one, name_in(session, body.by))
+    by = name_in(session, body.by)
+    alerts.acknowledge_alert(session, one, by, acknowledged=body.acknowledged)
 
 
 def _silence(session: Session, state: AppState, one: str, body: ActsBody) -> None:

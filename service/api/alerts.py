@@ -329,8 +329,9 @@ def acknowledge(
 ) -> AlertDetail:
     """Note who looks after an alert, or that they do no more."""
     said = body or AcknowledgeBody()
-    noted = alerts.acknowledge_alert if said.acknowledged else alerts.give_back
-    return _with_acts(session, noted(session, alert_id, name_in(session, said.by)))
+    by = name_in(session, said.by)
+    record = alerts.acknowledge_alert(session, alert_id, by, acknowledged=said.acknowledged)
+    return _with_acts(session, record)
 
 
 @router.post("/{alert_id}/silence")

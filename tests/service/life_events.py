@@ -76,7 +76,12 @@ class LifeEvents(RuleBasedStateMachine):
         return list(items)
 
     def alert(self, n: int) -> dict[str, Any] | None:
-        found = sorted(self.firing(), key=lambda alert: (alert["kind"], str(alert["camera_id"])))
+        """One that fires; where none does, a camera is knocked first, else nearly none would."""
+        found = self.firing()
+        if not found and self.life.stands:
+            self.turn(self.camera(n), "knocked")
+            found = self.firing()
+        found.sort(key=lambda alert: (alert["kind"], str(alert["camera_id"])))
         return found[n % len(found)] if found else None
 
     @initialize()
@@ -134,17 +139,18 @@ class LifeEvents(RuleBasedStateMachine):
     def turn_for_sure(self, n: int, place: str, visit: bool) -> None:
         """One that is known is knocked until it is told; at times somebody goes there at once."""
         camera_id = self.camera(n)
-        if camera_id == STREET:
-            return
-        self.life.stands[camera_id] = "prior"
-        for _ in range(2):
-            self.see(camera_id, ())
-        self.life.stands[camera_id] = place
-        for _ in range(4):
-            self.see(camera_id, ())
-        if visit:
+        self.turn(camera_id, place)
+        if visit and camera_id != STREET:
             self.maintain(camera_id, None, 0.5)
             self.stop_maintaining(camera_id, 0)
+
+    def turn(self, camera_id: str, place: str) -> None:
+        if camera_id == STREET:
+            return
+        for there, looks in (("prior", 2), (place, 4)):
+            self.life.stands[camera_id] = there
+            for _ in range(looks):
+                self.see(camera_id, ())
 
     def see(self, camera_id: str, unidentifiable: tuple[str, ...]) -> None:
         """People walk, and the job looks at them."""
