@@ -31,6 +31,7 @@ _BLOCK = 1_000  # lines that are read at once
 MAX_LINE_CHARS = 1_000  # ten numbers need 200
 _MOST_IDS = 4 * MAX_TRACKS  # those of cars among them
 _LEAST_CELLS = 6  # frame, id, left, top, width, height
+_FEW = f"at least {_LEAST_CELLS} columns and at most {MAX_LINE_CHARS} characters are needed"
 # Columns of a line's numbers, which have no id among them; a line may end before the last.
 _CONF, _CLASS, _VISIBILITY = 5, 6, 7
 _READ_CELLS = 9  # up to the visibility
@@ -191,12 +192,12 @@ def _read_line(lines: _Lines, line_no: int, line: str) -> None:
     name = name or f"line {line_no}"
     at = lines.names.setdefault(name, len(lines.names))
     try:
+        if len(cells) < _LEAST_CELLS - 1:
+            raise ValueError(_FEW)
         numbers = tuple(map(float, cells))
-        if len(numbers) < _LEAST_CELLS - 1:
-            few = f"at least {_LEAST_CELLS} columns and at most {MAX_LINE_CHARS} characters"
-            raise ValueError(f"{few} are needed")
     except ValueError as error:
-        lines.broken.setdefault(name, f"line {line_no}: {error}; got {line.strip()[:80]!r}")
+        if name not in lines.broken:
+            lines.broken[name] = f"line {line_no}: {error}; got {line.strip()[:80]!r}"
         return
     lines.tracks.append(at)
     lines.cells.append(count)
