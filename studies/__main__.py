@@ -2,11 +2,23 @@
 
 import ast
 import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
+
+
+@contextmanager
+def _or_one_line(study: str) -> Iterator[None]:
+    """End with 1 where a study cannot be made, and say why in one line."""
+    try:
+        yield
+    except ValueError as error:
+        Console(stderr=True).print(f"[red]{study} failed:[/] {error}")
+        raise typer.Exit(1) from error
 
 
 def evaluate(
@@ -32,11 +44,10 @@ def evaluate(
     ] = 1.0,
 ) -> None:
     """Measure every estimator on recorded scenes whose cameras are knocked: the protocol."""
-    from models.errors import CalibrationError
     from studies.alarms.run import AlarmPlan, run_scene_alarms
     from studies.protocol.run import run_protocol
 
-    try:
+    with _or_one_line("evaluate"):
         if alarms:
             plan = AlarmPlan(
                 alarms_a_year=alarms_a_year,
@@ -55,9 +66,6 @@ def evaluate(
             output=output,
             plots=plots,
         )
-    except CalibrationError as error:
-        Console(stderr=True).print(f"[red]evaluate failed:[/] {error}")
-        raise typer.Exit(1) from error
 
 
 def protocol(
@@ -86,7 +94,7 @@ def protocol(
     from studies.served.run import run_served
     from studies.served.tasks import Table
 
-    try:
+    with _or_one_line("protocol"):
         run_served(
             recordings,
             tables=[Table(name) for name in tables.split(",")],
@@ -97,9 +105,6 @@ def protocol(
             output=output,
             page=write,
         )
-    except ValueError as error:
-        Console(stderr=True).print(f"[red]protocol failed:[/] {error}")
-        raise typer.Exit(1) from error
 
 
 def parts(
@@ -108,11 +113,14 @@ def parts(
     processes: Annotated[int, typer.Option(min=1, help="Parts at once, a core each.")] = 2,
     output: Annotated[Path, typer.Option(help="Where figures are kept.")] = Path("parts.jsonl"),
     write: Annotated[Path | None, typer.Option(help="A page with markers for the table.")] = None,
+    part: Annotated[list[str] | None, typer.Option(help="Only this one, or these.")] = None,
 ) -> None:
     """Measure what each part of the estimator is worth: the protocol with one off at a time."""
     from studies.served.parts import run_parts
 
-    run_parts(scenes, seeds=seeds, processes=processes, output=output, page=write)
+    only = part or ()
+    with _or_one_line("parts"):
+        run_parts(scenes, seeds=seeds, processes=processes, output=output, page=write, only=only)
 
 
 def flow_study(
@@ -222,10 +230,9 @@ def paper(
     ] = None,
 ) -> None:
     """The paper's tables beside ours; goes on where it was ended."""
-    from models.errors import CalibrationError
     from studies.paper.run import run_paper
 
-    try:
+    with _or_one_line("paper"):
         run_paper(
             scenes,
             parts=[name for name in parts.split(",") if name],
@@ -235,9 +242,6 @@ def paper(
             out=out,
             page=write,
         )
-    except CalibrationError as error:
-        Console(stderr=True).print(f"[red]paper failed:[/] {error}")
-        raise typer.Exit(1) from error
 
 
 def http(

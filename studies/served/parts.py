@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from models.errors import ShapeError
 from studies.lines_file import LinesFile
 from studies.pages import markers, write_between
 from studies.runs import with_bar
@@ -33,7 +34,8 @@ class PartFigures:
     `fault` is a fault, a table of other cases (few tracks, far pans), or empty: cases by time.
     `covered` is the share of identifiable parameters whose 90 % interval holds the truth, `beyond`
     the cases with one more than 5 standard deviations off, `told` the share of those that moved
-    of which that is said, `cpu_s` seconds a case.
+    of which that is said, `false_alarms` the number of those that stood of which it is, `cpu_s`
+    seconds a case.
     """
 
     part: str
@@ -48,6 +50,7 @@ class PartFigures:
     cut: float
     told: float
     cpu_s: float
+    false_alarms: int | None = None
 
 
 def run_parts(
@@ -57,16 +60,27 @@ def run_parts(
     processes: int,
     output: Path,
     page: Path | None,
+    only: Sequence[str] = (),
 ) -> None:
     """Measure what the output does not have yet, print the table, write it into a page.
 
+    Of all parts, or of `only` some, each beside all of them together.
+
     Raises:
-        ShapeError: a recording or the output cannot be read, or the page lacks its markers.
+        ShapeError: a recording or the output cannot be read, the page lacks its markers, or there
+            is no such part.
     """
+    for name in only:
+        if name not in PARTS:
+            raise ShapeError(f"part: {', '.join(PARTS)} are known, got {name!r}")
     console, kept = Console(), LinesFile(output)
     found = [PartFigures(**row) for row in kept.rows]
     known = {(each.part, each.fault) for each in found}
-    wanted = [(part, fault) for part, fault in _wanted() if (part, fault) not in known]
+    wanted = [
+        (part, fault)
+        for part, fault in wanted_rows(only or tuple(PARTS))
+        if (part, fault) not in known
+    ]
     pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"), max_tasks_per_child=1)
     calls = [partial(measure, part, fault, list(folders), seeds) for part, fault in wanted]
     with pool:
@@ -117,6 +131,7 @@ def measure(part: str, fault: str, folders: Sequence[Path], seeds: int) -> PartF
         cut=every.cut,
         told=sum(o.state == "drifting" for o in turned) / max(len(turned), 1),
         cpu_s=(time.process_time() - begun_s) / max(len(outcomes), 1),
+        false_alarms=sum(o.state == "drifting" for o in stood),
     )
 
 
@@ -125,10 +140,10 @@ def table_of(found: Iterable[PartFigures]) -> str:
     by_key = {(each.part, each.fault): each for each in found}
     head = (
         "off", "with", "n", "still, deg", "moved, deg (worst tenth)", "height", "covered",
-        "beyond 5 sd", "cut", "told", "CPU-s a case", "lines",
+        "beyond 5 sd", "cut", "told", "false", "CPU-s a case", "lines",
     )  # fmt: skip
     rows = [head, ("---",) * len(head)]
-    for part, fault in _wanted():
+    for part, fault in wanted_rows(tuple(PARTS)):
         each = by_key.get((part, fault))
         if each is not None:
             rows.append(_row(each))
@@ -148,16 +163,18 @@ def _row(each: PartFigures) -> tuple[str, ...]:
         str(each.beyond),
         f"{each.cut:.0%}",
         f"{each.told:.0%}",
+        "" if each.false_alarms is None else str(each.false_alarms),
         f"{each.cpu_s:.2f}",
         "" if part is None else str(part.lines),
     )
 
 
-def _wanted() -> list[tuple[str, str]]:
-    """Every part with the faults it is there for, beside all parts with these."""
-    faults = dict.fromkeys(fault for part in PARTS.values() for fault in part.faults)
+def wanted_rows(names: Sequence[str]) -> list[tuple[str, str]]:
+    """Each of some parts with the faults it is there for, beside all parts with these."""
+    parts = {name: PARTS[name] for name in names}
+    faults = dict.fromkeys(fault for part in parts.values() for fault in part.faults)
     whole = [(WHOLE, fault) for fault in ("", *faults)]
-    return whole + [(name, fault) for name, part in PARTS.items() for fault in ("", *part.faults)]
+    return whole + [(name, fault) for name, part in parts.items() for fault in ("", *part.faults)]
 
 
 def _stands(knock: str) -> bool:

@@ -98,7 +98,7 @@ PARTS: dict[str, Part] = {
         words="points that jump away and back are left out",
         off=(("models.tracks.walks:jumped", _none_of_points),),
         source=("models/tracks/hidden_feet.py",),
-        faults=("jumps",),
+        faults=("jumps", "jumps-later"),
     ),
     "pieces": Part(
         words="pieces of one walk are put together",

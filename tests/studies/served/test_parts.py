@@ -2,9 +2,10 @@
 
 import pytest
 
+from models.errors import ShapeError
 from models.tracks import walks
 from studies.faults.catalogue import FAULTS
-from studies.served.parts import WHOLE, PartFigures, table_of
+from studies.served.parts import WHOLE, PartFigures, run_parts, table_of, wanted_rows
 from studies.served.parts_catalogue import PARTS
 from studies.served.tasks import Table
 
@@ -29,6 +30,7 @@ def test_the_table_has_a_row_for_what_was_measured():
     figures = {
         "cases": 10, "still_deg": 0.5, "moved_deg": 1.0, "moved_p90_deg": 3.0,
         "height_error": 0.02, "covered": 0.9, "beyond": 1, "cut": 0.0, "told": 0.5, "cpu_s": 0.4,
+        "false_alarms": 3,
     }  # fmt: skip
     rows = [
         PartFigures(part=WHOLE, fault="", **figures),
@@ -40,4 +42,12 @@ def test_the_table_has_a_row_for_what_was_measured():
     assert "| far | 10 | - | 1.00 (3.0) |" in lines[4]  # nothing stands there
     assert lines[2].startswith("| nothing | nothing wrong | 10 | 0.50 | 1.00 (3.0) | 2.0% | 90%")
     assert lines[3].startswith("| pieces: pieces of one walk are put together | fragments |")
-    assert lines[3].endswith(f"| {PARTS['pieces'].lines} |")
+    assert lines[3].endswith(f"| 0% | 50% | 3 | 0.40 | {PARTS['pieces'].lines} |")
+
+
+def test_only_some_parts_are_measured_and_those_that_are_none_are_named(tmp_path):
+    some = {"seeds": 1, "processes": 1, "output": tmp_path / "parts.jsonl", "page": None}
+    with pytest.raises(ShapeError, match="part: .*, jumps, .* are known, got 'stilts'"):
+        run_parts([], **some, only=["stilts"])
+    assert {fault for _, fault in wanted_rows(["jumps"])} == {"", "jumps", "jumps-later"}
+    assert {part for part, _ in wanted_rows(["jumps"])} == {WHOLE, "jumps"}
