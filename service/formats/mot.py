@@ -147,7 +147,7 @@ def _read_lines(body: bytes) -> _Lines:
         check_effort()
         if not _read_even(lines, block):
             for line_no, line in enumerate(block, start=first_no):
-                if line.isspace() or (line_no == 1 and line.lower().startswith("frame")):
+                if line.isspace() or (line_no == 1 and line[:5].lower() == "frame"):
                     continue
                 _read_line(lines, line_no, line)
         first_no += len(block)
@@ -197,7 +197,8 @@ def _read_line(lines: _Lines, line_no: int, line: str) -> None:
         numbers = tuple(map(float, cells))
     except ValueError as error:
         if name not in lines.broken:
-            lines.broken[name] = f"line {line_no}: {error}; got {line.strip()[:80]!r}"
+            got = line[:MAX_LINE_CHARS].strip()[:80]
+            lines.broken[name] = f"line {line_no}: {error}; got {got!r}"
         return
     lines.tracks.append(at)
     lines.cells.append(count)
