@@ -10,13 +10,15 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from models.errors import CalibrationError
+
 
 @contextmanager
-def _or_one_line(study: str) -> Iterator[None]:
+def _or_one_line(study: str, failure: type[ValueError] = CalibrationError) -> Iterator[None]:
     """End with 1 where a study cannot be made, and say why in one line."""
     try:
         yield
-    except ValueError as error:
+    except failure as error:
         Console(stderr=True).print(f"[red]{study} failed:[/] {error}")
         raise typer.Exit(1) from error
 
@@ -94,7 +96,7 @@ def protocol(
     from studies.served.run import run_served
     from studies.served.tasks import Table
 
-    with _or_one_line("protocol"):
+    with _or_one_line("protocol", ValueError):
         run_served(
             recordings,
             tables=[Table(name) for name in tables.split(",")],
@@ -264,7 +266,6 @@ def http(
     import httpx
     from rich.progress import Progress
 
-    from models.errors import CalibrationError
     from studies.protocol.cases import RANGES
     from studies.served.replay_protocol import print_outcome, replay_protocol
 
