@@ -5,7 +5,6 @@ and the longest wait of `/healthz` meanwhile. No process may take more than `--l
 """
 
 import argparse
-import multiprocessing
 import resource
 import sys
 import tempfile
@@ -21,7 +20,7 @@ from rich.table import Table
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.benchmarks.parts.health_probe import answer_at_once, probe_health
+from tests.benchmarks.parts.health_probe import probing
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
 
@@ -127,34 +126,28 @@ class Cost:
     idle_ms: float
 
 
-def measure(folder: Path, limit_mb: int, kind: str, body: bytes, idle_port: int) -> Cost:
+def measure(folder: Path, limit_mb: int, kind: str, body: bytes) -> Cost:
     """Post a body to a service of its own, and ask from another process how it is meanwhile."""
     settings = Settings(data_dir=folder / "data", workers=0, port=free_port())
     migrate(settings)
-    running, context = RunningService(settings), multiprocessing.get_context("spawn")
+    running = RunningService(settings)
     running.start()
-    stop, begun, (mine, theirs) = context.Event(), context.Event(), context.Pipe()
-    asked = (settings.port, idle_port, stop, theirs, _EVERY_S, begun)
-    prober = context.Process(target=probe_health, args=asked, daemon=True)
     try:
         running.http.post("/cameras", json={**CAMERA, "id": "c0"}).raise_for_status()
         limit = limit_mb * 2**20
         resource.prlimit(running.process.pid, resource.RLIMIT_AS, (limit, limit))
-        prober.start()
-        begun.wait()
-        before_mb, begun_s = memory_mb(running.process.pid), time.perf_counter()
-        try:
-            answer = httpx.post(
-                f"{running.url}/cameras/c0/tracks{_QUERY}",
-                content=body, headers={"Content-Type": kind}, timeout=120,
-            )  # fmt: skip
-            said = f"{answer.status_code} {answer.text[-70:]}" if answer.is_error else "202"
-        except httpx.HTTPError as error:
-            said = type(error).__name__
-        took_s = time.perf_counter() - begun_s
-        stop.set()
-        worst = max(mine.recv(), key=lambda probe: probe.health_s)
-        prober.join()
+        with probing(settings.port, _EVERY_S) as ended:
+            before_mb, begun_s = memory_mb(running.process.pid), time.perf_counter()
+            try:
+                answer = httpx.post(
+                    f"{running.url}/cameras/c0/tracks{_QUERY}",
+                    content=body, headers={"Content-Type": kind}, timeout=120,
+                )  # fmt: skip
+                said = f"{answer.status_code} {answer.text[-70:]}" if answer.is_error else "202"
+            except httpx.HTTPError as error:
+                said = type(error).__name__
+            took_s = time.perf_counter() - begun_s
+            worst = max(ended(), key=lambda probe: probe.health_s)
         return Cost(
             answer=said,
             took_s=took_s,
@@ -174,21 +167,15 @@ def main() -> None:
     parser.add_argument("--limit-mb", type=int, default=6_000)
     asked = parser.parse_args()
     table = Table("body", "answer", "s", "MB before", "MB peak", "/healthz ms", "idle ms")
-    idle_port = free_port()
-    idle = multiprocessing.get_context("spawn").Process(target=answer_at_once, args=(idle_port,))
-    idle.start()
-    try:
-        for name, (kind, made) in BODIES.items():
-            if asked.names and name not in asked.names:
-                continue
-            with tempfile.TemporaryDirectory() as folder:
-                cost = measure(Path(folder), asked.limit_mb, kind, made(), idle_port)
-            numbers = (cost.took_s, cost.before_mb, cost.peak_mb, cost.health_ms, cost.idle_ms)
-            row = [f"{number:.2f}" if number < 10 else f"{number:.0f}" for number in numbers]
-            sys.stderr.write(f"{name}: {cost.answer} {' '.join(row)}\n")
-            table.add_row(name, cost.answer, *row)
-    finally:
-        idle.terminate()
+    for name, (kind, made) in BODIES.items():
+        if asked.names and name not in asked.names:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            cost = measure(Path(folder), asked.limit_mb, kind, made())
+        numbers = (cost.took_s, cost.before_mb, cost.peak_mb, cost.health_ms, cost.idle_ms)
+        row = [f"{number:.2f}" if number < 10 else f"{number:.0f}" for number in numbers]
+        sys.stderr.write(f"{name}: {cost.answer} {' '.join(row)}\n")
+        table.add_row(name, cost.answer, *row)
     Console().print(table)
 
 

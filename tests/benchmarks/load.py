@@ -8,7 +8,6 @@ import argparse
 import asyncio
 import gc
 import json
-import multiprocessing
 import random
 import sys
 import tempfile
@@ -24,7 +23,7 @@ import psutil
 
 from service.commands.migrate import migrate
 from service.settings import Settings
-from tests.benchmarks.parts.health_probe import answer_at_once, probe_health
+from tests.benchmarks.parts.health_probe import probing
 from tests.benchmarks.parts.http_client import Answer, Connection
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
@@ -193,24 +192,15 @@ def _run(service: RunningService, wanted: argparse.Namespace) -> dict[str, objec
     trained_s = _seconds_until(lambda: not _training(service, wanted.cameras), most_s=900)
     load = Load(port, wanted.cameras, wanted.seed)
     watch = Watch(service.process.pid, service.settings)
-    context = multiprocessing.get_context("spawn")
-    stop, (mine, theirs) = context.Event(), context.Pipe()
-    idle_port = free_port()
-    idle = context.Process(target=answer_at_once, args=(idle_port,), daemon=True)
-    prober = context.Process(target=probe_health, args=(port, idle_port, stop, theirs))
     watch.start()
-    idle.start()
-    prober.start()
     lasts_s = 60 * wanted.minutes
-    gc.freeze()  # nor is what the clients wait for themselves the server's delay
-    asyncio.run(load.run(wanted.clients, wanted.rate, wanted.reads, time.monotonic() + lasts_s))
-    after = _seconds_until(lambda: service.http.get("/readyz").json()["store_writable"])
-    stop.set()
-    probes = mine.recv()
+    with probing(port) as ended:
+        gc.freeze()  # nor is what the clients wait for themselves the server's delay
+        asyncio.run(load.run(wanted.clients, wanted.rate, wanted.reads, time.monotonic() + lasts_s))
+        after = _seconds_until(lambda: service.http.get("/readyz").json()["store_writable"])
+        probes = ended()
     health = [probe.health_s for probe in probes]
     slowest = sorted(probes, key=lambda probe: probe.health_s)[-8:]
-    prober.join()
-    idle.terminate()
     watch.stop()
     warm_s = min(_WARM_S, lasts_s / 2)
     memory = {name: growth(samples, warm_s) for name, samples in watch.rss.items()}

@@ -3,15 +3,18 @@
 import asyncio
 import contextlib
 import gc
+import multiprocessing
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection as Pipe
 from multiprocessing.synchronize import Event
 
 from tests.benchmarks.parts.http_client import Connection
+from tests.running import free_port
 
 
-def answer_at_once(port: int) -> None:
+def _answer_at_once(port: int) -> None:
     """A server that has nothing else to do: what it takes is the machine's doing."""
 
     async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -34,15 +37,38 @@ class Probe:
     idle_s: float
 
 
-def probe_health(
-    port: int,
-    idle_port: int,
-    stop: Event,
-    pipe: Pipe,
-    every_s: float = 0.1,
-    begun: Event | None = None,
+@contextlib.contextmanager
+def probing(port: int, every_s: float = 0.1) -> Iterator[Callable[[], list[Probe]]]:
+    """Ask for /healthz within the block, from a process of its own that has begun by then.
+
+    What is given ends it, and returns all that it has seen.
+    """
+    context = multiprocessing.get_context("spawn")
+    stop, begun, (mine, theirs) = context.Event(), context.Event(), context.Pipe()
+    idle_port = free_port()
+    idle = context.Process(target=_answer_at_once, args=(idle_port,), daemon=True)
+    asked = (port, idle_port, every_s, begun, stop, theirs)
+    prober = context.Process(target=_probe_health, args=asked, daemon=True)
+    idle.start()
+    prober.start()
+    begun.wait()
+
+    def ended() -> list[Probe]:
+        stop.set()
+        seen: list[Probe] = mine.recv()
+        prober.join()
+        return seen
+
+    try:
+        yield ended
+    finally:
+        prober.terminate()
+        idle.terminate()
+
+
+def _probe_health(
+    port: int, idle_port: int, every_s: float, begun: Event, stop: Event, pipe: Pipe
 ) -> None:
-    """Ask for /healthz ten times a second, from a process of its own; `begun` is set then."""
     # Else it looks once through all that it has imported, and that would be the server's delay.
     gc.freeze()
 
@@ -57,8 +83,7 @@ def probe_health(
         while (await idle.ask("GET", "/")).status != 200:  # it is being started
             await asyncio.sleep(0.05)
         first = time.perf_counter()
-        if begun is not None:
-            begun.set()
+        begun.set()
         while not stop.is_set():
             at_s = time.perf_counter() - first
             taken.append(Probe(at_s, await seconds(health), await seconds(idle)))
