@@ -60,7 +60,7 @@ def show(
     chosen: ChosenDep,
     all_: Annotated[bool, Query(alias="all", description="those that have ended, too")] = False,
 ) -> HTMLResponse:
-    """Alerts, newest first; those that fire, unless others are asked for."""
+    """Alerts, newest first, members below their group; those that fire, unless others are asked."""
     newest = journal.newest_event_id(session)
     if chosen.state is None and not all_:
         chosen = replace(chosen, state=AlertState.FIRING)
@@ -76,7 +76,7 @@ def show(
     return render(
         request,
         "alerts.html",
-        rows=[_row(record, names, clock) for record in shown],
+        rows=[_row(record, names, clock) for record in _below_their_groups(shown)],
         more=more,
         chips=_chips(asked),
         csv=_csv(asked, chosen.state),
@@ -139,6 +139,16 @@ def _csv(asked: Sequence[tuple[str, str]], state: AlertState | None) -> str:
     """The query of the file that has what the page has."""
     kept = [pair for pair in asked if pair[0] not in ("all", "state")]
     return urlencode([("format", "csv"), *kept, *([("state", state)] if state else [])])
+
+
+def _below_their_groups(records: Sequence[AlertRecord]) -> list[AlertRecord]:
+    """The alerts in their order, but those for which a shown one speaks right below that."""
+    places: dict[str | None, int] = {each.id: place for place, each in enumerate(records)}
+
+    def order(alert: AlertRecord) -> tuple[int, bool]:
+        return places.get(alert.group_id, places[alert.id]), alert.group_id is not None
+
+    return sorted(records, key=order)
 
 
 def _row(record: AlertRecord, names: dict[str, str], clock: Clock) -> AlertRow:

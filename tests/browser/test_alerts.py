@@ -1,8 +1,12 @@
 """The page of all alerts in a browser: twelve answered by three clicks, one in its line."""
 
+from datetime import UTC, datetime
+
 import pytest
+from sqlalchemy import select
 
 from service.store import references
+from service.store.alerts import AlertRecord
 from tests.browser.conftest import axe, shoot, too_wide
 from tests.service.fleet_bench import Fleet
 
@@ -168,6 +172,9 @@ def test_a_trackers_group_is_answered_once_for_all_and_undone(page, server):
             references.newest(session, f"c{n}").source = "nvr-east"
     for n in range(3):
         fleet.knock(f"c{n}")
+    with fleet.store.write() as session:  # one was told of after the group
+        last = session.scalars(select(AlertRecord).where(AlertRecord.camera_id == "c0")).one()
+        last.opened_at = datetime.now(UTC)
     fleet.close()
     page.goto("/")
     page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
@@ -175,6 +182,7 @@ def test_a_trackers_group_is_answered_once_for_all_and_undone(page, server):
     expect(banner.get_by_role("button")).to_have_text(
         ["It was put right", "False alarm", "Acknowledge", "Silence…"]
     )
+    expect(page.locator("#due")).to_have_text("1 needs a person, 3 cameras of nvr-east as one")
     page.get_by_label("Choose all that are found").check()
     expect(page.locator("#mixed")).to_have_text("3 of 3 are answered with their tracker.")
     expect(page.locator("#bulk").get_by_role("button", name="They were put back")).to_be_hidden()
@@ -196,6 +204,8 @@ def test_a_trackers_group_is_answered_once_for_all_and_undone(page, server):
     page.set_viewport_size({"width": 1280, "height": 800})
     page.goto("/ui/alerts")
     expect(rows).to_have_count(4)
+    # The one that speaks for them comes first, whichever is the newest.
+    expect(rows.locator(".badge")).to_have_text(["Many moved", "Moved", "Moved", "Moved"])
     assert axe(page) == []
     shoot(page, "group-alerts")
     page.get_by_role("button", name="It was put right").click()

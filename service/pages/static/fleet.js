@@ -90,7 +90,8 @@ async function show() {
 
 function say(cameras) {
   const counts = {};
-  let waiting = [...document.querySelectorAll("#banners [data-waiting]")].reduce((sum, each) => sum + Number(each.dataset.waiting), 0);
+  const groups = [...document.querySelectorAll("#banners [data-waiting='1']")].map((each) => _("{group} as one", { group: each.dataset.name }));
+  let waiting = groups.length;
   for (const { waiting: its } of index.values()) waiting += its;
   for (const { state } of here()) counts[state] = (counts[state] ?? 0) + 1;
   showPlaces(places, [...index.values()], chosenPlace);
@@ -100,7 +101,7 @@ function say(cameras) {
     chip.classList.toggle("empty-state", !count);
     chip.setAttribute("aria-pressed", String(states.has(chip.dataset.state)));
   }
-  due.textContent = waiting ? _n("{n} needs a person", "{n} need a person", waiting) : index.size ? _("Nothing needs a person") : "";
+  due.textContent = waiting ? [_n("{n} needs a person", "{n} need a person", waiting), ...groups].join(", ") : index.size ? _("Nothing needs a person") : "";
   document.title = (waiting ? `(${waiting}) ` : "") + plainTitle;
   none.hidden = cameras.length > 0;
   if (index.size) none.textContent = _("No camera is like that.");
