@@ -155,14 +155,14 @@ class Creep(TestStatistic):
 
 
 def creep_result(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
-    """Most likely creep by a log's newest weeks; None of too few people.
+    """Most likely creep by a log's newest weeks; None of too few people, or days.
 
     `alarms_a_year` are allowed of the creep alone. Since `from_s` the camera has stood as it does,
     but for a creep; whole days count.
     """
     scores = ramp_scores(log, from_s)
-    if scores is None:
-        return None
+    if scores is None or not scores.information.all():
+        return None  # the afternoon of the reference's own day is all there is: no ramp has begun
     chance = min(alarms_a_year / config.CREEP_TESTS, 0.5) / 2
     level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
     statistics = scores.score**2 / scores.information

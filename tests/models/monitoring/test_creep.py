@@ -112,6 +112,16 @@ def test_few_people_say_nothing_and_only_whole_days_since_a_time_count():
     assert weeks_of(log, from_s - 30 * DAY_S + 1).groups.sum() == 18 * 32
 
 
+def test_the_afternoon_of_the_references_own_day_tells_of_no_creep():
+    """It ended at 18:00 of a day whose middle is noon: the ramp's turn was 0 / 0, and kept so."""
+    afternoon = replace(blank(1, groups=400.0), since_day=20_000.75)
+    assert creep_result(afternoon, A_YEAR) is None
+    assert np.isfinite(posterior_mean_turns(afternoon, np.array([20_000.5]))).all()
+    result = creep_result(replace(blank(2, groups=400.0), since_day=20_000.75), A_YEAR)
+    assert result.statistic == 0
+    assert math.isfinite(result.sd)
+
+
 def test_a_turn_is_believed_once_it_is_clear_and_a_still_camera_is_left_alone():
     log = blank(120)
     days = np.array([20_010.0, 20_060.0, 20_119.0])
