@@ -86,6 +86,28 @@ def test_the_first_map_stays_as_the_map_grows(known):
     assert (kept.flow, kept.chart, kept.to_s) == (first.flow, first.chart, first.to_s)
 
 
+@pytest.mark.filterwarnings("default::RuntimeWarning")  # as in a worker
+def test_an_alert_of_the_day_after_an_afternoons_reference_can_be_opened_and_read(http, settings):
+    """Its log lay before any ramp: PostgreSQL refused the evidence, SQLite could not read it."""
+    http.post("/cameras", json={**CAMERA, "reference_tracks": WANTED}).raise_for_status()
+    street = Street(http, settings)
+    street.clock_s = (time.time() // DAY_S - 3) * DAY_S + 18 * 3600
+    street.keep_to_lanes(PRIOR, WANTED)
+    assert street.look()["reference"]["state"] == "ready"
+    street.keep_to_lanes(PRIOR, 80)
+    street.clock_s = (street.clock_s // DAY_S + 1) * DAY_S + 8 * 3600
+    street.keep_to_lanes(PRIOR, 5)
+    street.look()
+    assert len(days_of(street)) == 1
+    street.keep_to_lanes(replace(PRIOR, tilt_rad=PRIOR.tilt_rad + math.radians(5)), 60)
+    street.look()
+    (alert,) = street.alerts(state="firing")
+    evidence = http.get(f"/alerts/{alert['id']}/evidence").raise_for_status().json()
+    assert evidence["creep"] is None
+    assert evidence["chart"]["statistic"] > evidence["chart"]["level"]
+    street.close()
+
+
 def test_whole_days_are_logged_once(known):
     day = int(known.clock_s // DAY_S)
     live(known, 3, look_every=3)
