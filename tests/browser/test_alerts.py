@@ -81,6 +81,7 @@ def test_a_second_click_at_one_place_answers_no_other_alert(page, server):
     fleet.close()
     page.goto("/ui/alerts")
     page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
+    page.get_by_text("No worker runs").wait_for()  # it comes late, and moves the rows
     rows = page.locator(".alert-row")
     box = rows.first.get_by_role("button", name="False alarm").bounding_box()
     at = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
