@@ -33,6 +33,9 @@ log = logging.getLogger("surefoot.serve")
 
 _SWITCH_S = 0.001
 _BACKLOG = 128  # connections in the kernel while we are busy; asyncio accepts so many in one go
+# Longer than clients and proxies keep what is idle (nginx 60 s, Go 90 s): of two that close at once
+# one has asked, and is not answered.
+_KEEP_ALIVE_S = 100
 
 
 def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
@@ -66,6 +69,7 @@ def run_service(settings: Settings, *, follow_stdin: bool = False) -> None:
             access_log=False,
             server_header=False,
             proxy_headers=False,  # whom to believe is the guard's to know
+            timeout_keep_alive=_KEEP_ALIVE_S,
             timeout_graceful_shutdown=3,
         )
         server = uvicorn.Server(config)

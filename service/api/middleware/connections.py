@@ -1,7 +1,8 @@
 """Connections: so many, so many from an address, and none that only keeps its place.
 
 Where tokens are needed, who has shown none gives way to who comes, the oldest first: a place is
-kept by a token. Elsewhere a request keeps it.
+kept by a token. Elsewhere a request keeps it. After them who asks nothing just then gives way, the
+longest silent first: a client may close, and be closed, between its requests.
 
 uvicorn waits for ever for headers, for bodies and for clients that take their answers.
 """
@@ -61,6 +62,7 @@ class ConnectionGuard:
         self.open = 0
         self.auth = auth_on(settings)
         self.strangers: dict[GuardedProtocol, None] = {}  # who may have to give way; oldest first
+        self.idle: dict[GuardedProtocol, None] = {}  # between requests; the longest so first
 
 
 def allow_descriptors() -> int:
@@ -91,11 +93,10 @@ class GuardedProtocol(H11Protocol):
         super().connection_made(transport)
         guard = self._guard
         self._address = self.client[0] if self.client else "local"
-        if guard.of_address[self._address] >= guard.most_of_address:
-            same = [other for other in guard.strangers if other._address == self._address]
-            if not self._made_room(same, "address"):
-                return
-        if guard.open >= guard.most and not self._made_room(list(guard.strangers), "full"):
+        many = guard.of_address[self._address] >= guard.most_of_address
+        if many and not self._made_room("address", {self._address}):
+            return
+        if guard.open >= guard.most and not self._made_room("full", set(guard.of_address)):
             return
         self._counted = True
         guard.open += 1
@@ -113,6 +114,7 @@ class GuardedProtocol(H11Protocol):
         if self.transport.is_closing():
             return
         self._received += len(data)
+        self._guard.idle.pop(self, None)
         super().data_received(data)
         if self._answered_early():
             self._unread += len(data)
@@ -127,6 +129,8 @@ class GuardedProtocol(H11Protocol):
         super().on_response_complete()
         self._unread = 0
         self._answered_s = self.loop.time()
+        if self._counted and self.conn.their_state is h11.IDLE:
+            self._guard.idle[self] = None
         self._watch()
 
     def pause_writing(self) -> None:
@@ -151,9 +155,9 @@ class GuardedProtocol(H11Protocol):
             return False
         return not self._guard.auth or self.scope["state"].get("caller") is not None
 
-    def _made_room(self, strangers: "list[GuardedProtocol]", reason: str) -> bool:
-        """End the oldest of those who have to give way; else this one."""
-        for oldest in strangers:
+    def _made_room(self, reason: str, addresses: set[str]) -> bool:
+        """End the oldest of those who have to give way, else the longest idle, else this one."""
+        for oldest in [other for other in self._guard.strangers if other._address in addresses]:
             if oldest._known():
                 del self._guard.strangers[oldest]
                 continue
@@ -162,6 +166,10 @@ class GuardedProtocol(H11Protocol):
             else:
                 oldest._end("stranger", _BUSY, abort=True)
             return True
+        for idle in self._guard.idle:
+            if idle._address in addresses:
+                idle._end("idle", b"")  # who has asked nothing is answered nothing
+                return True
         self._end(reason, _BUSY)
         return False
 
@@ -232,6 +240,7 @@ class GuardedProtocol(H11Protocol):
     def _leave(self) -> None:
         guard = self._guard
         guard.strangers.pop(self, None)
+        guard.idle.pop(self, None)
         for timer in (self._timer, self._reader_timer):
             if timer is not None:
                 timer.cancel()

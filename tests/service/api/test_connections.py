@@ -124,6 +124,25 @@ def in_process(settings, **more):
     thread.join()
 
 
+def ask(made, path, end, more=b""):
+    """Ask by a connection that is kept open, and read until the end of what has to come."""
+    made.sendall(b"GET %s HTTP/1.1\r\nHost: localhost\r\n%s\r\n" % (path, more))
+    found = b""
+    while end not in found:
+        chunk = made.recv(65536)
+        assert chunk, found
+        found += chunk
+    return found.startswith(b"HTTP/1.1 200 ")
+
+
+def asks(made):
+    return ask(made, b"/healthz", b'{"status":"ok"}')
+
+
+def follows(made, more=b""):
+    return ask(made, b"/events", b": connected", more)
+
+
 def healthy(address):
     made = socket.create_connection(address, timeout=10)
     made.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
@@ -132,14 +151,8 @@ def healthy(address):
 
 @pytest.mark.parametrize("given", [b"\xb2", b"9" * 30, b"-1"], ids=["digit", "large", "below"])
 def test_a_last_event_id_that_is_none_opens_a_stream(api, given):
-    head = b"GET /events HTTP/1.1\r\nHost: localhost\r\nLast-Event-ID: "
-    made = connect(api, head + given + b"\r\n\r\n")
-    found = b""
-    while b": connected" not in found:
-        chunk = made.recv(65536)
-        assert chunk, found
-        found += chunk
-    assert found.startswith(b"HTTP/1.1 200 ")
+    made = connect(api)
+    assert follows(made, b"Last-Event-ID: " + given + b"\r\n")
     made.close()
 
 
@@ -149,16 +162,30 @@ def test_one_address_has_its_share(settings):
         silent = [socket.create_connection(address, timeout=10) for _ in range(7)]
         assert healthy(address)
         kept = [socket.create_connection(address, timeout=10) for _ in range(5)]
-        for made in kept:
-            made.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            assert made.recv(65536).startswith(b"HTTP/1.1 200 ")
-        # Five that were answered and are kept open are the address's share.
+        assert all(asks(made) for made in kept)
+        # Of five that were answered and are kept open who asks nothing for longest makes room.
+        assert asks(kept[0])
+        assert healthy(address)
+        assert everything(kept[1]) == b""
+        assert everything(silent[0])[: len(LATE)] in (b"", LATE)
+        busy = [kept[0], *kept[2:], socket.create_connection(address, timeout=10)]
+        assert all(follows(made) for made in busy)
+        # Five that are being answered are the address's share.
         assert everything(socket.create_connection(address, timeout=10)).startswith(
             b"HTTP/1.1 503 "
         )
-        kept[0].close()
+        busy[0].close()
         wait_for(lambda: healthy(address), 10)
-        assert everything(silent[0])[: len(LATE)] in (b"", LATE)
+        for made in busy:
+            made.close()
+
+
+def test_who_posts_every_few_seconds_keeps_his_connection(patient_api):
+    """Longer than uvicorn's 5 s, at which a service closes as a client asks once more."""
+    made = connect(patient_api)
+    for pause_s in (0.0, 5.5):
+        time.sleep(pause_s)
+        assert asks(made)
 
 
 def test_answers_do_not_wait_for_acknowledgements(settings):
