@@ -115,7 +115,8 @@ def in_process(settings, **more):
 
     guard = ConnectionGuard(settings.model_copy(update=more), app.state.instruments)
     listener = listen(settings.model_copy(update={"port": 0}))
-    server = uvicorn.Server(uvicorn.Config(app, http=lambda **how: Noting(guard=guard, **how)))
+    how = {"http": lambda **more: Noting(guard=guard, **more), "timeout_graceful_shutdown": 1}
+    server = uvicorn.Server(uvicorn.Config(app, **how))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
     wait_for(lambda: server.started, 10, 0.01)
@@ -176,8 +177,6 @@ def test_one_address_has_its_share(settings):
         )
         busy[0].close()
         wait_for(lambda: healthy(address), 10)
-        for made in busy:
-            made.close()
 
 
 def test_who_posts_every_few_seconds_keeps_his_connection(patient_api):

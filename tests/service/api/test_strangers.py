@@ -10,7 +10,7 @@ from service.access import tokens
 from service.access.tokens import TokenSpec
 from service.store.engines.store import Store
 from tests.running import served, wait_for
-from tests.service.api.test_connections import everything, in_process
+from tests.service.api.test_connections import everything, follows, in_process
 
 FEW = {"auth": "on", "max_connections": 12, "connections_per_address": 0}
 LOGIN = (
@@ -83,8 +83,7 @@ def test_a_place_is_kept_while_a_body_is_sent(settings, bearer):
 def test_those_who_have_tokens_are_refused_once_all_places_are_theirs(settings, bearer):
     with in_process(settings, **FEW) as (address, _):
         held = [socket.create_connection(address, timeout=10) for _ in range(12)]
-        for made in held:
-            assert ask(made, b"GET /cameras", bearer).startswith(b"HTTP/1.1 200 ")
+        assert all(follows(made, bearer + b"\r\n") for made in held)
         beyond = socket.create_connection(address, timeout=10)
         assert everything(beyond).startswith(b"HTTP/1.1 503 ")
         held[0].close()
@@ -94,6 +93,22 @@ def test_those_who_have_tokens_are_refused_once_all_places_are_theirs(settings, 
             return ask(new, b"GET /healthz").startswith(b"HTTP/1.1 200 ")
 
         wait_for(taken, 10)
+
+
+def test_who_has_a_token_and_asks_nothing_makes_room_once(settings, bearer):
+    """Those who keep connections open shut nobody out, and strangers get one place of theirs."""
+    with in_process(settings, **FEW) as (address, _):
+        idle = [socket.create_connection(address, timeout=10) for _ in range(12)]
+        for made in idle:
+            assert ask(made, b"GET /cameras", bearer).startswith(b"HTTP/1.1 200 ")
+        slow = [slow_login(address) for _ in range(20)]
+        assert everything(slow[0]).startswith(GAVE_WAY)
+        assert everything(idle[0]) == b""
+        for made in idle[1:]:
+            assert ask(made, b"GET /cameras", bearer).startswith(b"HTTP/1.1 200 ")
+        new = socket.create_connection(address, timeout=10)
+        assert ask(new, b"GET /cameras", bearer).startswith(b"HTTP/1.1 200 ")
+        assert everything(slow[-1]).startswith(GAVE_WAY)
 
 
 def test_a_stranger_sends_a_token_and_no_more(settings, bearer):
