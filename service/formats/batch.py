@@ -10,7 +10,13 @@ from typing import Any
 
 from models.effort import EffortExceededError, check_effort, limited_effort
 from service.errors import FieldError, MalformedError, TooLargeError
-from service.formats.json_body import DOCUMENT_FIELDS, TrackTexts, read_document, read_track_text
+from service.formats.json_body import (
+    DOCUMENT_FIELDS,
+    TrackTexts,
+    is_large,
+    read_document,
+    read_line,
+)
 from service.formats.json_track import TRACK_FIELDS, read_track
 from service.formats.track import (
     MAX_ID_LENGTH,
@@ -30,7 +36,6 @@ DEFAULT_SOURCE = "unnamed"
 _FAR_S = 1e12
 MOST_IGNORED = 20  # names of unknown fields that an answer says
 MAX_CPU_S = 10.0  # of reading one body: the largest honest ones take one or two
-_LARGE_LINE = 64 * 1024  # bytes
 _MOST_ENDS = 4 * MAX_TRACKS  # of lines, blank ones among them
 
 
@@ -111,8 +116,7 @@ def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch
     def items() -> Iterator[tuple[int, Any, Callable[[], IncomingTrack]]]:
         for index, line in enumerate(lines):
             try:
-                large = len(line) > _LARGE_LINE
-                raw = read_track_text(line) if large else json.loads(line)
+                raw = read_line(line) if is_large(body) else json.loads(line)
             except (ValueError, RecursionError) as error:
                 yield index, None, partial(refuse, f"not JSON: {error}")
             else:

@@ -108,7 +108,7 @@ def read_document(body: bytes) -> Any:
         TooLargeError: something other than tracks is large.
         MalformedError: a large body that is no object, or has no list of tracks.
     """
-    if len(body) <= _SMALL:
+    if not is_large(body):
         return json.loads(body)
     encoding = json.detect_encoding(body)
     if encoding != "utf-8":
@@ -116,12 +116,31 @@ def read_document(body: bytes) -> Any:
     try:
         return _document(body, stand_ins=False)
     except ValueError:
-        if any(number in body for _, number in _STAND_INS):
-            raise
         replaced = _with_stand_ins(body)
-        if replaced == body or len(replaced) - len(body) > _MOST_GROWTH:
+        if replaced is None:
             raise
     return _document(replaced, stand_ins=True)
+
+
+def is_large(body: bytes) -> bool:
+    """True of a body that is taken apart before it is read."""
+    return len(body) > _SMALL
+
+
+def read_line(line: bytes) -> Any:
+    """The value of a track that is a line of a large body, as of `read_track_text`.
+
+    Raises:
+        ValueError: it is no JSON.
+        RecursionError: it is nested too deeply.
+    """
+    try:
+        return read_track_text(line)
+    except ValueError:
+        replaced = _with_stand_ins(line)
+        if replaced is None:
+            raise
+    return read_track_text(replaced, stand_ins=True)
 
 
 def read_track_text(text: bytes | Raw, *, stand_ins: bool = False) -> Any:
@@ -215,8 +234,13 @@ def _document(body: bytes, *, stand_ins: bool) -> dict[str, Any]:
     return document
 
 
-def _with_stand_ins(body: bytes) -> bytes:
-    """A body with numbers for its words, a part at a time, so that other threads have a turn."""
+def _with_stand_ins(body: bytes) -> bytes | None:
+    """A body with numbers for its words; None where it has none, or too many, or such a number.
+
+    A part is replaced at a time, so that other threads have a turn.
+    """
+    if any(number in body for _, number in _STAND_INS):
+        return None
     parts, begin = [], 0
     while begin < len(body):
         comma = body.find(b",", begin + _PART)
@@ -226,7 +250,9 @@ def _with_stand_ins(body: bytes) -> bytes:
             part = part.replace(word, number)
         parts.append(part)
         begin = end
-    return b"".join(parts)
+    replaced = b"".join(parts)
+    many = len(replaced) - len(body) > _MOST_GROWTH
+    return None if many or replaced == body else replaced
 
 
 def _with_words(text: bytes) -> bytes:

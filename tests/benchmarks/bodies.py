@@ -98,6 +98,7 @@ BODIES: dict[str, tuple[str, Callable[[], bytes]]] = {
     "ndjson 11": (NDJSON, filled("", "11\n", "")),
     "ndjson empty": (NDJSON, filled("", "\n", "")),
     "ndjson one line": (NDJSON, filled("", "[", "\n")),
+    "ndjson lists": (NDJSON, filled("", '{"id":"1","points":[' + "[]," * 9_999 + "1]}\n", "")),
     "honest": (JSON, honest),
 }  # fmt: skip
 

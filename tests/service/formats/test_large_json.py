@@ -37,11 +37,15 @@ def everything_is_large(monkeypatch):
     monkeypatch.setattr(json_body, "_SMALL", 0)
 
 
-def read(body, small):
+def read_lines(body, clock, limits):
+    return read_ndjson(body, "a", clock, limits)
+
+
+def read(body, small, reader=read_json):
     """What is taken of a body, and which of its tracks are not; None of one that is no JSON."""
     kept, json_body._SMALL = json_body._SMALL, small
     try:
-        found = read_json(body, CLOCK, LIMITS)
+        found = reader(body, CLOCK, LIMITS)
     except (MalformedError, TooLargeError):
         return None
     finally:
@@ -56,6 +60,13 @@ def test_the_same_tracks_are_taken(document, tracks, indent, first):
     made = {"tracks": tracks, **document} if first else {**document, "tracks": tracks}
     body = json.dumps(made, indent=indent, ensure_ascii=first).encode()
     assert read(body, 0) == read(body, MB)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(walks | values, max_size=5), st.booleans())
+def test_the_same_lines_are_taken(tracks, ascii_only):
+    body = "\n".join(json.dumps(one, ensure_ascii=ascii_only) for one in tracks).encode()
+    assert read(body, -1, read_lines) == read(body, MB, read_lines)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32-le"])
@@ -87,14 +98,16 @@ def test_a_track_that_cannot_be_read_is_named_and_loses_none_beside_it(everythin
         7,
         track("Infinity"),
     ]
-    found = read_json(json.dumps({"tracks": tracks}).encode(), CLOCK, LIMITS)
-    said = [(one.index, one.track_id, one.code) for one in found.rejections]
-    assert said == [
-        (0, "word", "malformed"), (1, "null", "not_finite"), (2, "NaNcy", "not_finite"),
-        (3, "short", "malformed"), (4, "none", "malformed"), (5, None, "malformed"),
-    ]  # fmt: skip
-    assert found.rejections[0].detail == f"points/{len(rows)}/1: Expected `float`, got `str`"
-    assert [one.track_id for one in found.tracks] == ["Infinity"]
+    whole = read_json(json.dumps({"tracks": tracks}).encode(), CLOCK, LIMITS)
+    lines = read_lines("\n".join(map(json.dumps, tracks)).encode(), CLOCK, LIMITS)
+    for found in (whole, lines):
+        said = [(one.index, one.track_id, one.code) for one in found.rejections]
+        assert said == [
+            (0, "word", "malformed"), (1, "null", "not_finite"), (2, "NaNcy", "not_finite"),
+            (3, "short", "malformed"), (4, "none", "malformed"), (5, None, "malformed"),
+        ]  # fmt: skip
+        assert found.rejections[0].detail == f"points/{len(rows)}/1: Expected `float`, got `str`"
+        assert [one.track_id for one in found.tracks] == ["Infinity"]
 
 
 def test_a_body_of_nothing_but_words_is_no_json():
