@@ -110,9 +110,7 @@ def read_document(body: bytes) -> Any:
     """
     if not is_large(body):
         return json.loads(body)
-    encoding = json.detect_encoding(body)
-    if encoding != "utf-8":
-        body = body.decode(encoding).encode()
+    body = _as_utf8(body)
     try:
         return _document(body, stand_ins=False)
     except ValueError:
@@ -134,6 +132,7 @@ def read_line(line: bytes) -> Any:
         ValueError: it is no JSON.
         RecursionError: it is nested too deeply.
     """
+    line = _as_utf8(line)
     try:
         return read_track_text(line)
     except ValueError:
@@ -232,6 +231,12 @@ def _document(body: bytes, *, stand_ins: bool) -> dict[str, Any]:
         count = next((n for n, text in enumerate(texts) if text is _ABSENT), len(texts))
         document["tracks"] = TrackTexts(texts=texts[:count], stand_ins=stand_ins)
     return document
+
+
+def _as_utf8(text: bytes) -> bytes:
+    """A text in the encoding that msgspec reads, without a mark of its order of bytes."""
+    encoding = json.detect_encoding(text)
+    return text if encoding == "utf-8" else text.decode(encoding).encode()
 
 
 def _with_stand_ins(body: bytes) -> bytes | None:

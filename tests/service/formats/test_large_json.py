@@ -69,6 +69,12 @@ def test_the_same_lines_are_taken(tracks, ascii_only):
     assert read(body, -1, read_lines) == read(body, MB, read_lines)
 
 
+def test_a_mark_before_the_first_line_loses_no_track():
+    body = "\n".join(json.dumps(track(name)) for name in "12").encode("utf-8-sig")
+    assert len(read(body, 0, read_lines)[0]) == 2
+    assert read(body, 0, read_lines) == read(body, MB, read_lines)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32-le"])
 def test_other_encodings_are_read(encoding):
     body = json.dumps({"tracks": [track("1")]}).encode(encoding)
