@@ -40,7 +40,6 @@ OTHERS = {
     ("workers/estimate.py", "picture"): "the part of an estimate that failed",
     ("formats/json_body.py", "source"): "the name of a field",
     ("formats/json_body.py", "tracks"): "the name of a field",
-    ("store/fleet.py", "rhythm"): "the name of a field",
     ("job_queue.py", "estimate"): "the engine's name of a queue and of a job",
     ("workers/processes/process.py", "estimate"): "what a worker may be for alone, defined there",
     ("workers/upkeep/reconciliation.py", "stale"): "the name of a log line",

@@ -376,6 +376,7 @@ table(
     "camera_rhythms",
     key("camera_id", String(64), of("cameras.id")),
     *optional(JSON, "profile"),
+    *optional(Double, "usual_gap_s", "delay_s"),
     *needed(JSON, "counts"),
     *needed(DateTime, "learned_at"),
 )

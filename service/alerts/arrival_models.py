@@ -129,23 +129,27 @@ def save_arrival_model(
 ) -> None:
     """Store an arrival model, unless its camera is gone."""
     if session.get(CameraRecord, camera_id) is not None:
-        profile = None
-        if learned is not None:
-            profile = {"rhythm": asdict(learned.rhythm), "delay_s": learned.delay_s}
+        profile = None if learned is None else asdict(learned.rhythm)
         session.merge(
             RhythmRecord(
-                camera_id=camera_id, profile=profile, counts=asdict(counts), learned_at=now
+                camera_id=camera_id,
+                usual_gap_s=None if profile is None else profile.pop("usual_gap_s"),
+                delay_s=None if learned is None else learned.delay_s,
+                profile=profile,
+                counts=asdict(counts),
+                learned_at=now,
             )
         )
 
 
 def arrival_model_of(session: Session, camera_id: str) -> ArrivalModel | None:
     """The arrival model of a camera; None where too little of it is known."""
-    profile = cameras.arrival_profile(session, camera_id)
-    if profile is None:
+    kept = cameras.arrival_profile(session, camera_id)
+    if kept is None:
         return None
-    numbers = {**profile["rhythm"], "rates": tuple(profile["rhythm"]["rates"])}
-    return ArrivalModel(rhythm=ArrivalProcess(**numbers), delay_s=profile["delay_s"])
+    numbers = {**kept.profile, "rates": tuple(kept.profile["rates"])}
+    rhythm = ArrivalProcess(**numbers, usual_gap_s=kept.usual_gap_s)
+    return ArrivalModel(rhythm=rhythm, delay_s=kept.delay_s)
 
 
 def cells_of(first_hour: int, count: int, zone: tzinfo) -> np.ndarray:

@@ -13,6 +13,7 @@ from sqlalchemy import (
     Index,
     Integer,
     LargeBinary,
+    Row,
     String,
     bindparam,
     cast,
@@ -378,7 +379,8 @@ def lacking(session: Session, code: ServiceCode) -> set[str]:
 class RhythmRecord(Record):
     """The arrival model of a camera: how many people come when, and how late.
 
-    `counts` has the tracks of each hour that they were learned of: it outlives the tracks.
+    `counts` has the tracks of each hour that they were learned of: it outlives the tracks. The
+    times beside the profile are what pages of all cameras ask, and empty where it is.
     """
 
     __tablename__ = "camera_rhythms"
@@ -387,13 +389,17 @@ class RhythmRecord(Record):
         ForeignKey("cameras.id", ondelete="CASCADE"), primary_key=True
     )
     profile: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    usual_gap_s: Mapped[float | None]
+    delay_s: Mapped[float | None]
     counts: Mapped[dict[str, Any]]
     learned_at: Mapped[datetime]
 
 
-def arrival_profile(session: Session, camera_id: str) -> dict[str, Any] | None:
-    """The profile of a camera alone; None where there is none yet."""
-    return session.scalar(select(RhythmRecord.profile).where(RhythmRecord.camera_id == camera_id))
+def arrival_profile(session: Session, camera_id: str) -> Row[Any] | None:
+    """The profile of a camera and the times beside it; None where there is none yet."""
+    query = select(RhythmRecord.profile, RhythmRecord.usual_gap_s, RhythmRecord.delay_s)
+    found = RhythmRecord.camera_id == camera_id, RhythmRecord.profile.is_not(None)
+    return session.execute(query.where(*found)).first()
 
 
 class ImageRecord(Record):

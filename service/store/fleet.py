@@ -141,9 +141,8 @@ def _newest(*, some: bool, whole: bool, lean: bool) -> Select[Any]:
             CameraRecord.id,
             *(_LEAN if lean else (SiteReferenceRecord, EstimateRecord)),
             last.correlate(CameraRecord).scalar_subquery(),
-            # Two numbers of some fifty.
-            RhythmRecord.profile["rhythm", "usual_gap_s"].as_float(),
-            RhythmRecord.profile["delay_s"].as_float(),
+            RhythmRecord.usual_gap_s,
+            RhythmRecord.delay_s,
             fires.correlate(CameraRecord),
             attended.correlate(CameraRecord),
             PriorPoseRecord.origin,

@@ -83,11 +83,12 @@ def _know_hours(fleet: Fleet) -> None:
     counts = {"tracks": {str(480_000 + hour): 20 for hour in range(28 * 24)}, "latest_s": {}}
     rates = [20 / (3 + hour) for hour in range(CELLS)]
     process = ArrivalProcess(rates=tuple(rates), burst=1.5, shape=4.0, usual_gap_s=3_600.0, days=14)
-    profile = {"rhythm": asdict(process), "delay_s": 5.0}
+    profile = asdict(process)
+    times = {"usual_gap_s": profile.pop("usual_gap_s"), "delay_s": 5.0}
     with fleet.store.write() as session:
         for camera_id in session.scalars(select(CameraRecord.id)).all():
             known = {"profile": profile, "counts": counts, "learned_at": now}
-            session.add(RhythmRecord(camera_id=camera_id, **known))
+            session.add(RhythmRecord(camera_id=camera_id, **known, **times))
 
 
 def _steady(fleet: Fleet) -> list[str]:

@@ -40,7 +40,7 @@ from service.workers.processes.collector import settle_collector
 imported = [[] for _ in range(800_000)]
 settle_collector()
 before = gc.get_stats()[2]["collections"]
-new = [[] for _ in range(180_000)]
+new = [[] for _ in range(500_000)]
 print(gc.get_stats()[2]["collections"] - before)
 """
 
