@@ -56,10 +56,15 @@ class Entry:
     kinds: str
 
     @property
-    def order(self) -> tuple[int, int, str, str]:
-        """Sorts first what a person should look at first; of one kind the newest, then by name."""
+    def order(self) -> tuple[int, str, int, str, str]:
+        """Sorts first what a person should look at first; of one kind the newest, then by name.
+
+        Of one rank kinds stand together, moves first: what is alike is answered at once.
+        """
         calm = self.rank >= _CALM
-        return self.rank, 0 if calm else -self.since_s, sortable(self.label.name), self.id
+        kind = "" if calm or self.shown == PoseState.DRIFTING else str(self.shown)
+        since_s = 0 if calm else self.since_s
+        return self.rank, kind, -since_s, sortable(self.label.name), self.id
 
     def line(self, place: str | int) -> tuple[str | int | None, ...]:
         """As the page's script reads it (fleet.js), with its place, or the number of that."""

@@ -8,7 +8,7 @@ from babel.dates import format_timedelta, get_day_names, get_month_names
 from service.wording.language import _, spoken
 
 _AT_LEAST = 1.5  # of a unit, to say a length of time in it: "90 minutes", then "2 hours"
-_JUST_NOW = timedelta(seconds=10), timedelta(minutes=1)  # before and after now
+_JUST_NOW = timedelta(seconds=30), timedelta(minutes=1)  # before and after now
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,12 +55,17 @@ class Clock:
         return f"{at.astimezone(self.zone):%Y-%m-%d}"
 
     def ago(self, at: datetime) -> str:
-        """An age, or in how long a time comes; `times.js` says the same as time goes on."""
+        """An age in minutes or more, or in how long a time comes; `times.js` keeps it true.
+
+        Seconds would change under whoever reads, and nobody acts on them.
+        """
         if self.now - _JUST_NOW[0] < at <= self.now + _JUST_NOW[1]:
             return _("just now")
         # A whole number, since of a timedelta it would take the second before.
         seconds = round((at - self.now).total_seconds())
-        return format_timedelta(seconds, threshold=_AT_LEAST, add_direction=True, locale=spoken())
+        return format_timedelta(
+            seconds, "minute", threshold=_AT_LEAST, add_direction=True, locale=spoken()
+        )
 
     def of(self, seconds: float) -> datetime:
         """The time of seconds since the epoch."""

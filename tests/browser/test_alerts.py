@@ -43,7 +43,7 @@ def test_twelve_cameras_take_three_clicks_and_it_stays_live(page, server):
     for button in page.locator("#bulk [data-bulk]").all():
         assert button.get_attribute("title").endswith(".")  # what it comes to
     expect(page.locator("#mixed")).to_have_text(
-        "Not every answer fits all: 1 of 13 is a clock fault."
+        "Not every answer fits all: 1 of 13 is a clock fault (clock)."
     )
     shoot(page, "alerts-chosen")
     page.get_by_label("Choose clock").uncheck()

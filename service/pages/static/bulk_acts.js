@@ -7,6 +7,7 @@ import { ask, signed, wordsIn } from "./dialogs.js";
 import { _, _n } from "./words.js";
 
 const AT_ONCE = 500;
+const FEW = 3;
 const OF_ALERTS = ["resolve", "acknowledge", "silence"];
 const RULE = JSON.parse(document.getElementById("rule")?.textContent ?? "{}");
 
@@ -39,17 +40,18 @@ export function offer(bulk, items, noun) {
 const takes = (kinds, act) => kinds.split(" ").some((kind) => RULE.kinds[kind].takes.includes(act));
 
 /**
- * "Not every answer fits all: 2 of 5 are clock faults." All but the most of a kind are named; where none of
- * them can be answered, all: "3 of 3 are answered with their tracker."
+ * "Not every answer fits all: 2 of 5 are clock faults (Gate 1, Gate 2)." All but the most of a kind are told,
+ * by their names where they are few; where none can be answered, all: "3 of 3 are answered with their tracker."
  */
 function mixture(items, lost) {
-  const counts = new Map();
-  for (const { kinds } of items) counts.set(kinds, (counts.get(kinds) ?? 0) + 1);
-  const fewer = [...counts].sort(([, a], [, b]) => b - a).slice(lost ? 1 : 0);
-  const parts = fewer.map(([kinds, count], at) => {
-    const words = kinds.split(" ").map((kind) => RULE.kinds[kind].words[count === 1 ? 0 : 1]);
-    const said = { n: count, all: items.length, are: words.join(_(" and ")) };
-    return at ? _("{n} {are}", said) : _("{n} of {all} {are}", said);
+  const names = new Map();
+  for (const { kinds, name } of items) names.set(kinds, [...(names.get(kinds) ?? []), name]);
+  const fewer = [...names].sort(([, a], [, b]) => b.length - a.length).slice(lost ? 1 : 0);
+  const parts = fewer.map(([kinds, own], at) => {
+    const words = kinds.split(" ").map((kind) => RULE.kinds[kind].words[own.length === 1 ? 0 : 1]);
+    const said = { n: own.length, all: items.length, are: words.join(_(" and ")) };
+    const which = lost && own.length <= FEW ? ` (${own.join(", ")})` : "";
+    return (at ? _("{n} {are}", said) : _("{n} of {all} {are}", said)) + which;
   });
   if (!lost) return items.length ? `${parts.join(", ")}.` : "";
   return _("Not every answer fits all: {some}.", { some: parts.join(", ") });

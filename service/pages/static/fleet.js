@@ -50,8 +50,10 @@ function note([id, name, state, rank, waiting, since, fresh, last, words, kinds,
 const noteAll = (told) => told.cameras.forEach((line) => note(line, told.places));
 
 const byName = (a, b) => (a.name < b.name ? -1 : a.name > b.name ? 1 : a.id < b.id ? -1 : 1);
+const kindOf = ({ state }) => (state === "drifting" ? "" : state); // moves first
+const byKind = (a, b) => (kindOf(a) < kindOf(b) ? -1 : Number(kindOf(a) > kindOf(b)));
 const ORDERS = {
-  "": (a, b) => a.rank - b.rank || (a.rank < CALM ? b.since - a.since : 0) || byName(a, b),
+  "": (a, b) => a.rank - b.rank || (a.rank < CALM ? byKind(a, b) || b.since - a.since : 0) || byName(a, b),
   name: byName,
   since: (a, b) => b.since - a.since || byName(a, b),
   last: (a, b) => (a.last ?? 0) - (b.last ?? 0) || byName(a, b),
@@ -275,7 +277,7 @@ const chosenOnes = () =>
     kinds: index.get(camera).kinds,
     waiting: index.get(camera).waiting,
     fresh: index.get(camera).fresh,
-    name: rows.get(camera)?.querySelector(".who a").textContent,
+    name: rows.get(camera)?.querySelector(".who a").textContent ?? camera,
   }));
 
 list.addEventListener("change", ({ target }) => target.matches(".pick") && choose([target.closest("li").dataset.id], target.checked));

@@ -10,16 +10,15 @@ const UNITS = [
   ["day", 86_400],
   ["hour", 3600],
   ["minute", 60],
-  ["second", 1],
 ];
 const AT_LEAST = 1.5; // of a unit, to say a length of time in it: "90 minutes", then "2 hours"
 const WORDS = new Intl.RelativeTimeFormat(language);
 
 export function ago(iso) {
   const seconds = (Date.parse(iso) - Date.now()) / 1000;
-  if (seconds > -10 && seconds <= 60) return _("just now");
+  if (seconds > -30 && seconds <= 60) return _("just now");
   const [unit, size] = UNITS.find(([, size]) => Math.abs(seconds) >= AT_LEAST * size) ?? UNITS.at(-1);
-  return WORDS.format(Math.round(seconds / size), unit);
+  return WORDS.format(Math.sign(seconds) * Math.max(Math.round(Math.abs(seconds) / size), 1), unit);
 }
 
 /** Keep every <time> within some elements true. */

@@ -237,8 +237,9 @@ def test_words_are_made_without_a_store():
         "0 seconds", "89 seconds", "2 minutes", "90 minutes", "2 hours", "2 days"
     ]  # fmt: skip
     now = datetime.now(UTC)
-    said = {-61: "in 61 seconds", -60: "just now", 9.9: "just now", 10: "10 seconds ago",
-            3000: "50 minutes ago", -7200: "in 2 hours", 11 * 86_400: "2 weeks ago"}  # fmt: skip
+    said = {-61: "in 1 minute", -60: "just now", 29.9: "just now", 30: "1 minute ago",
+            91: "2 minutes ago", 3000: "50 minutes ago",
+            -7200: "in 2 hours", 11 * 86_400: "2 weeks ago"}  # fmt: skip
     for seconds, words in said.items():
         assert Clock(now=now, zone=UTC).ago(now - timedelta(seconds=seconds)) == words
     assert [height_change(m) for m in (-0.12, 1.34)] == ["12 cm lower", "1.3 m higher"]
