@@ -81,7 +81,7 @@ def test_an_operator_reads_german_and_may_read_english(page, server):
     expect(page.locator("#chosen")).to_have_text("2 Kameras")
     page.get_by_label("Ecke 1 wählen").check()
     expect(page.locator("#mixed")).to_have_text(
-        "Nicht jede Antwort passt zu allen: 1 von 3 mit falscher Uhr."
+        "Nicht jede Antwort passt zu allen: 1 von 3 mit falscher Uhr (Ecke 1)."
     )
     page.get_by_label("Ecke 1 wählen").uncheck()
     page.get_by_role("button", name="Mit alter Ausrichtung neu lernen").click()
