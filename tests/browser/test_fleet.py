@@ -158,6 +158,23 @@ def test_it_comes_back_by_itself_and_has_missed_nothing(page, fleet, server):
     page.get_by_text("does not answer").wait_for(state="detached")
 
 
+def test_a_page_that_is_being_left_asks_nothing_more(page, fleet):
+    """It told of a lost connection and asked why: 50 ms before the next page was begun."""
+    expect = pytest.importorskip("playwright.sync_api").expect
+    page.add_init_script(
+        """const fetched = window.fetch;
+        window.fetch = (url, given) => {
+            sessionStorage.asked = `${sessionStorage.asked ?? ""} ${url}`;
+            return fetched(url, given);
+        };"""
+    )
+    for _ in range(4):
+        page.goto("/")
+        expect(page.locator("#live")).to_have_text("Live")
+        page.wait_for_timeout(300)
+    assert "limit=1" not in page.evaluate("sessionStorage.asked")
+
+
 def test_what_happened_while_the_page_was_made_is_not_lost(page, fleet, server):
     fleet.add("alpha", "Alpha")
     page.goto("/")

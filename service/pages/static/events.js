@@ -4,6 +4,7 @@ import { _ } from "./words.js";
 
 const TYPES = ["pose", "alert", "training"];
 const AGAIN_MS = 3000;
+const LEAVING_MS = 250; // until a page that is being left is gone
 
 /**
  * Call `onEvent({type, id, data})` for each event after the one that the page was made at.
@@ -14,23 +15,26 @@ const AGAIN_MS = 3000;
 export function subscribe(onEvent, onState = showState) {
   let source = null;
   let timer = null;
+  let lost = null;
   let seen = document.querySelector('meta[name="newest-event"]')?.content ?? "";
 
   const close = () => {
     clearTimeout(timer);
+    clearTimeout(lost);
     source?.close();
     source = null;
   };
   const open = () => {
     close();
     source = new EventSource("/events" + (seen ? `?after=${encodeURIComponent(seen)}` : ""));
-    source.onopen = () => onState("on");
+    source.onopen = () => {
+      clearTimeout(lost);
+      onState("on");
+    };
+    // A page that is being left loses its connection, too: it would tell so, and ask why.
     source.onerror = () => {
-      onState("off");
-      // The browser tries again by itself unless the answer was an error.
-      if (source?.readyState !== EventSource.CLOSED) return;
-      timer = setTimeout(open, AGAIN_MS);
-      leaveIfLoggedOut().catch(() => {});
+      clearTimeout(lost);
+      lost = setTimeout(broken, LEAVING_MS);
     };
     for (const type of TYPES) {
       source.addEventListener(type, (event) => {
@@ -39,9 +43,15 @@ export function subscribe(onEvent, onState = showState) {
       });
     }
   };
+  const broken = () => {
+    onState("off");
+    // The browser tries again by itself unless the answer was an error.
+    if (source?.readyState !== EventSource.CLOSED) return;
+    timer = setTimeout(open, AGAIN_MS);
+    leaveIfLoggedOut().catch(() => {});
+  };
   const onVisibility = () => (document.hidden ? close() : open());
   document.addEventListener("visibilitychange", onVisibility);
-  // A page that is being left would tell of a lost connection.
   window.addEventListener("pagehide", close);
   window.addEventListener("pageshow", (event) => event.persisted && open());
   open();
