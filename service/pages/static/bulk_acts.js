@@ -45,7 +45,10 @@ const takes = (kinds, act) => kinds.split(" ").some((kind) => RULE.kinds[kind].t
  */
 function mixture(items, lost) {
   const names = new Map();
-  for (const { kinds, name } of items) names.set(kinds, [...(names.get(kinds) ?? []), name]);
+  for (const { kinds, name } of items) {
+    if (!names.has(kinds)) names.set(kinds, []);
+    names.get(kinds).push(name);
+  }
   const fewer = [...names].sort(([, a], [, b]) => b.length - a.length).slice(lost ? 1 : 0);
   const parts = fewer.map(([kinds, own], at) => {
     const words = kinds.split(" ").map((kind) => RULE.kinds[kind].words[own.length === 1 ? 0 : 1]);
