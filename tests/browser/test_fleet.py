@@ -74,7 +74,7 @@ def test_an_alert_comes_up_by_itself(page, fleet, server):
     assert page.locator("#announce").inner_text() == ""
 
 
-@pytest.mark.parametrize("width", [920, 1280])
+@pytest.mark.parametrize("width", [981, 1280])
 def test_cells_stand_under_their_heads_and_keep_to_themselves(page, fleet, width):
     fleet.add("alpha", "Alpha")
     fleet.now -= timedelta(minutes=20)  # "29 minutes ago" is as wide as such words become
@@ -100,6 +100,8 @@ def test_cells_stand_under_their_heads_and_keep_to_themselves(page, fleet, width
           ];
         }"""
     )
+    edge = page.locator("#row-alpha").bounding_box()
+    assert rights[-1] <= edge["x"] + edge["width"]  # at 920 px the last column was cut off
     for column in (1, 2, 4, 5):  # a badge and a drawing have edges of their own
         assert texts[column][0] == pytest.approx(heads[column], abs=1)
         assert texts[column][1] <= rights[column] + 1
