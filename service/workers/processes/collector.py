@@ -4,9 +4,9 @@ A full collection looks at every object that may be part of a cycle, and nobody 
 meanwhile: 0.1 s for what a service imports, 10 ms for what it keeps after its first requests, and
 several times as long where others want the processor.
 
-Python looks again once what is new is a quarter of what it found the last time. Of what a service
-has imported a quarter is 50,000 objects, to be looked at in one go; of nothing it comes soon: every
-7 s under load, for 5 to 17 ms.
+Python looks at all again once what is new is a quarter of what it found the last time: of what a
+service has imported that is late, and much to be looked at in one go; of nothing it comes as soon
+as the counts below are full.
 """
 
 import contextlib
