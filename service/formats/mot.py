@@ -92,9 +92,12 @@ def read_mot(
     # Who stands with conf 0 is marked "ignore".
     kept = (cells <= _CONF + 1) | (numbers[:, _CONF] != 0)
     kept &= (found == _NONE_GIVEN) | np.isin(found, sorted(people))
-    left_out = len(kept) - int(kept.sum())
+    of = np.frombuffer(lines.tracks, dtype=np.int64)
+    whole = ~np.isin(of, [lines.names[name] for name in lines.broken])
+    left_out = int((whole & ~kept).sum())
+    kept &= whole
     boxes = _boxes(numbers[kept], clock, first=0 if limits.normalised else 1)
-    of = np.frombuffer(lines.tracks, dtype=np.int64)[kept]
+    of = of[kept]
     ordered = np.lexsort((boxes[:, 0], of))
     boxes = boxes[ordered]
     ends = np.cumsum(np.bincount(of, minlength=len(lines.names))).tolist()
@@ -191,14 +194,15 @@ def _read_line(lines: _Lines, line_no: int, line: str) -> None:
     name = cells.pop(1).strip()[:MAX_ID_LENGTH] if count > 1 and cells else ""
     name = name or f"line {line_no}"
     at = lines.names.setdefault(name, len(lines.names))
+    if name in lines.broken and lines.tracks:  # that one line can be read is known, too
+        return
     try:
         if len(cells) < _LEAST_CELLS - 1:
             raise ValueError(_FEW)
         numbers = tuple(map(float, cells))
     except ValueError as error:
-        if name not in lines.broken:
-            got = line[:MAX_LINE_CHARS].strip()[:80]
-            lines.broken[name] = f"line {line_no}: {error}; got {got!r}"
+        got = line[:MAX_LINE_CHARS].strip()[:80]
+        lines.broken.setdefault(name, f"line {line_no}: {error}; got {got!r}")
         return
     lines.tracks.append(at)
     lines.cells.append(count)

@@ -103,6 +103,22 @@ def test_malformed_text_costs_only_its_own_track(corner, settings):
     assert [record.track_id for record in stored(settings)] == ["1"]
 
 
+@pytest.mark.parametrize("at", [0, 3, 5])
+def test_lines_of_a_track_that_cannot_be_read_are_not_counted_as_left_out(corner, at):
+    lines = [*walk("broken", "0"), *walk("whole"), *walk("ignored", "0")]
+    lines[at] = lines[at].replace("51,40", "oops,40")
+    answer = send(corner, lines).json()
+    assert (answer["accepted"], answer["left_out"]) == (1, 6)
+    assert [each["id"] for each in answer["rejected"]] == ["broken"]
+
+
+def test_a_text_whose_first_track_is_broken_from_its_first_line_on_loses_that_alone(corner):
+    lines = walk("1") + walk("2")
+    lines[0] = "1,1,oops,50,40,150,1"
+    answer = send(corner, lines).json()
+    assert (answer["accepted"], [each["index"] for each in answer["rejected"]]) == (1, [0])
+
+
 @pytest.mark.parametrize("wrong", ["", "x", "1_0", "1,2", '"3"', "1" * 1_001])
 def test_lines_that_are_alike_are_read_as_one_by_one(monkeypatch, wrong):
     text = [*walk("007", "1.0,-1,-1,-1"), *walk("b c", "0.9,-1,-1,ten", count=4)]
