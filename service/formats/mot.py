@@ -35,7 +35,7 @@ _FEW = f"at least {_LEAST_CELLS} columns and at most {MAX_LINE_CHARS} characters
 # Columns of a line's numbers, which have no id among them; a line may end before the last.
 _CONF, _CLASS, _VISIBILITY = 5, 6, 7
 _READ_CELLS = 9  # up to the visibility
-_NONE = (float("nan"),) * (_VISIBILITY + 1)
+_NONE = array("d", [float("nan")] * (_VISIBILITY + 1))
 _WITH_CLASS = (8, 9)  # cells of lines that have one; lines of ten have a place in the world there
 _NONE_GIVEN = -1.0
 # Of ground truth, which has a visibility in column 9: pedestrians and people who stand.
@@ -189,24 +189,26 @@ def _read_even(lines: _Lines, block: list[str]) -> bool:
 
 
 def _read_line(lines: _Lines, line_no: int, line: str) -> None:
-    count = line.count(",") + 1
-    cells = line.split(",", _READ_CELLS)[:_READ_CELLS] if len(line) <= MAX_LINE_CHARS else []
-    name = cells.pop(1).strip()[:MAX_ID_LENGTH] if count > 1 and cells else ""
+    cells = line.split(",") if len(line) <= MAX_LINE_CHARS else []
+    count = len(cells) or line.count(",") + 1
+    name = cells[1].strip()[:MAX_ID_LENGTH] if count > 1 and cells else ""
     name = name or f"line {line_no}"
     at = lines.names.setdefault(name, len(lines.names))
     if name in lines.broken and lines.tracks:  # that one line can be read is known, too
         return
     try:
-        if len(cells) < _LEAST_CELLS - 1:
+        if len(cells) < _LEAST_CELLS:
             raise ValueError(_FEW)
-        numbers = tuple(map(float, cells))
+        del cells[_READ_CELLS:], cells[1]
+        numbers = array("d", map(float, cells))
     except ValueError as error:
         got = line[:MAX_LINE_CHARS].strip()[:80]
         lines.broken.setdefault(name, f"line {line_no}: {error}; got {got!r}")
         return
     lines.tracks.append(at)
     lines.cells.append(count)
-    lines.numbers.extend((numbers + _NONE)[: len(_NONE)])
+    lines.numbers += numbers
+    lines.numbers += _NONE[len(numbers) :]
 
 
 def _people(numbers: Array, cells: Index) -> frozenset[float]:
