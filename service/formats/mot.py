@@ -190,14 +190,14 @@ def _read_even(lines: _Lines, block: list[str]) -> bool:
 
 def _read_line(lines: _Lines, line_no: int, line: str) -> None:
     cells = line.split(",") if len(line) <= MAX_LINE_CHARS else []
-    count = len(cells) or line.count(",") + 1
-    name = cells[1].strip()[:MAX_ID_LENGTH] if count > 1 and cells else ""
+    count = len(cells)
+    name = cells[1].strip()[:MAX_ID_LENGTH] if count > 1 else ""
     name = name or f"line {line_no}"
     at = lines.names.setdefault(name, len(lines.names))
     if name in lines.broken and lines.tracks:  # that one line can be read is known, too
         return
     try:
-        if len(cells) < _LEAST_CELLS:
+        if count < _LEAST_CELLS:
             raise ValueError(_FEW)
         del cells[_READ_CELLS:], cells[1]
         numbers = array("d", map(float, cells))

@@ -21,6 +21,8 @@ from tests.cost.looks import LOOK_CPU_S, LOOK_MB, Cost, looker
 
 _WORST = 10
 
+Drawing = Callable[[Callable[..., None]], Callable[..., None]]
+
 
 def main() -> int:
     """Draw bodies, then windows; print the worst."""
@@ -40,9 +42,6 @@ def main() -> int:
     if asked.windows:
         beyond += _windows(asked.points, _drawing(asked.windows, asked.seed, phases))
     return 1 if beyond else 0
-
-
-Drawing = Callable[[Callable[..., None]], Callable[..., None]]
 
 
 def _drawing(examples: int, number: int, phases: tuple[Phase, ...]) -> Drawing:
