@@ -30,6 +30,7 @@ MAX_LINES = 500_000  # some seconds of reading
 _BLOCK = 1_000  # lines that are read at once
 MAX_LINE_CHARS = 1_000  # ten numbers need 200
 _MOST_IDS = 4 * MAX_TRACKS  # those of cars among them
+_TRIED = 10_000  # lines: a broken track's are read on, while none of a text could be
 _LEAST_CELLS = 6  # frame, id, left, top, width, height
 _FEW = f"at least {_LEAST_CELLS} columns and at most {MAX_LINE_CHARS} characters are needed"
 # Columns of a line's numbers, which have no id among them; a line may end before the last.
@@ -194,7 +195,7 @@ def _read_line(lines: _Lines, line_no: int, line: str) -> None:
     name = cells[1].strip()[:MAX_ID_LENGTH] if count > 1 else ""
     name = name or f"line {line_no}"
     at = lines.names.setdefault(name, len(lines.names))
-    if name in lines.broken and lines.tracks:  # that one line can be read is known, too
+    if name in lines.broken and (lines.tracks or line_no > _TRIED):
         return
     try:
         if count < _LEAST_CELLS:

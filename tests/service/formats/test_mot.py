@@ -217,6 +217,16 @@ def test_little_is_built_of_what_is_no_line(corner, line, said):
     assert said in document["errors"][0]["reason"]
 
 
+def test_a_broken_track_is_read_no_further_where_nothing_else_can_be(corner):
+    """400,000 such lines took 3 s, since any of them might have been the first that is right."""
+    broken = ["1,7,x,1,9,9"] * 10_500
+    document = problem(send(corner, [*broken, *walk("7")]), 422, "malformed")
+    assert "not MOTChallenge text: line 1:" in document["errors"][0]["reason"]
+    answer = send(corner, [*broken, *walk("8")]).json()
+    assert answer["accepted"] == 1
+    assert [each["id"] for each in answer["rejected"]] == ["7"]
+
+
 def test_ids_are_bounded_whatever_they_are_of(corner):
     lines = (f"1,{n},1,1,9,9,1,5" for n in range(20_001))  # a car each
     document = problem(send(corner, lines), 413, "too_large")
