@@ -13,7 +13,6 @@ import time
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psutil
@@ -32,31 +31,14 @@ _DAYS = (30, 20 * 365)
 _REST_S = 30.0  # after the looks that learned, so that none waits for a camera's next turn
 
 
-class _Street(Street):
-    """A street of the camera that is named."""
-
-    def __init__(self, running: RunningService, camera_id: str) -> None:
-        super().__init__(running.http, running.settings)
-        self._camera_id = camera_id
-
-    def _post(self) -> None:
-        answer = self.http.post(f"/cameras/{self._camera_id}/tracks", json={"tracks": self._bodies})
-        assert answer.json()["accepted"] == len(self._bodies), answer.text
-        self._bodies.clear()
-
-
-def learned(running: RunningService, camera_id: str) -> _Street:
+def learned(running: RunningService, camera_id: str) -> Street:
     """The street of a camera whose reference is ready."""
     body = {**CAMERA, "id": camera_id, "reference_tracks": 100}
     running.http.post("/cameras", json=body).raise_for_status()
-    street = _Street(running, camera_id)
+    street = Street(running.http, running.settings)
+    street.camera_id = camera_id
     street.keep_to_lanes(PRIOR, 160)
-
-    def ready() -> bool:
-        pose: dict[str, Any] = running.http.get(f"/cameras/{camera_id}/pose").json()
-        return pose.get("reference", {}).get("state") == "ready"
-
-    wait_for(ready)
+    wait_for(lambda: street.pose().get("reference", {}).get("state") == "ready")
     return street
 
 
@@ -85,7 +67,7 @@ def poison(running: RunningService, camera_id: str, days: float) -> str:
     return f"{answer.status_code} {answer.json()['errors'][0]['reason'].partition(':')[0]}"
 
 
-def knock(running: RunningService, streets: dict[str, _Street]) -> tuple[float, float]:
+def knock(running: RunningService, streets: dict[str, Street]) -> tuple[float, float]:
     """Seconds until the other's alert after its first tracks; the worker's most memory in MB."""
     worker, most_mb = psutil.Process(running.worker_pid()), 0.0
     streets["poisoned"].keep_to_lanes(PRIOR, 20)  # its look begins
@@ -120,7 +102,7 @@ def main() -> int:
                 sys.stdout.write(f"six points over {days} days: {said} by HTTP; stored by hand\n")
             time.sleep(_REST_S)
             told_s, worker_mb = knock(running, streets)
-            pose = running.http.get("/cameras/poisoned/pose").json()
+            pose = streets["poisoned"].pose()
         finally:
             running.stop()
     sys.stdout.write(f"told after {told_s:.1f} s (limit {TOLD_S:.0f}); ")

@@ -49,6 +49,7 @@ def lately_s() -> float:
 class Street:
     """People who walk past a camera one after the other, and the camera's service."""
 
+    camera_id = "corner"
     source: str | None = None  # of their tracks; the default one's, where none is named
 
     def __init__(self, http: Any, settings: Any) -> None:
@@ -138,17 +139,17 @@ class Street:
         body = {"tracks": self._bodies}
         if self.source is not None:
             body["source"] = self.source
-        answer = self.http.post("/cameras/corner/tracks", json=body)
+        answer = self.http.post(f"/cameras/{self.camera_id}/tracks", json=body)
         assert answer.json()["accepted"] == len(self._bodies), answer.text
         self._bodies.clear()
 
     def look(self) -> dict[str, Any]:
         """Run the estimate job; returns the served pose."""
-        run_estimate(self.context, "corner")
+        run_estimate(self.context, self.camera_id)
         return self.pose()
 
     def pose(self) -> dict[str, Any]:
-        body: dict[str, Any] = self.http.get("/cameras/corner/pose").json()
+        body: dict[str, Any] = self.http.get(f"/cameras/{self.camera_id}/pose").json()
         return body
 
     def alerts(self, **query: str) -> list[dict[str, Any]]:
