@@ -2,6 +2,7 @@
 
 import ast
 import io
+import os
 import re
 import subprocess
 import tokenize
@@ -32,8 +33,11 @@ def our_files() -> list[Path]:
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     if listed.returncode:
-        found = [path.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file()]
-        return [path for path in found if not _NOT_OURS & set(path.parts)]
+        found = []
+        for folder, names, files in os.walk(ROOT):
+            names[:] = [name for name in names if name not in _NOT_OURS]
+            found += [Path(folder, name).relative_to(ROOT) for name in files]
+        return found
     return [Path(line) for line in listed.stdout.splitlines() if (ROOT / line).is_file()]
 
 

@@ -7,6 +7,7 @@ from tests.browser.conftest import shoot
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.nightly
 def test_operations_show_open_and_are_tried(page):
     # The fixture fails on a request to another host, a script's error or a breach of the policy.
     page.goto("/docs")

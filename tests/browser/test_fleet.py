@@ -213,6 +213,7 @@ def test_it_is_sifted_by_keyboard_and_the_address_keeps_it(page, fleet):
     assert shown(page) == ["North door", "Quay"]
 
 
+@pytest.mark.nightly
 def test_many_are_paged_sorted_and_chosen_across_pages(page, fleet, server):
     expect = pytest.importorskip("playwright.sync_api").expect
     for n in range(60):

@@ -11,6 +11,7 @@ from tests.service.reports.rows import some_weeks
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.nightly
 def test_it_is_read_on_a_screen_and_printed_without_what_is_pressed(page, server):
     expect = pytest.importorskip("playwright.sync_api").expect
     fleet = Fleet(server.settings)

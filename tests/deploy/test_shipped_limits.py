@@ -67,7 +67,7 @@ def test_the_units_are_hardened_alike():
     assert api == worker
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_worst_bodies_at_once_leave_the_api_within_its_limit(migrated, tmp_path):
     names = ("csv x\\r", "source", "tracks of 1", "ndjson 11", "last row short", "NaN", "csv ids")
     names += ("honest",)

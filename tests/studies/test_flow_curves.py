@@ -16,6 +16,8 @@ from studies.protocol.learned import learn_case
 from studies.simulation.lanes import SiteConfig
 from tests.models.sites import LENS, PRIOR, tracks_of
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:

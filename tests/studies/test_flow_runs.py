@@ -18,6 +18,8 @@ from studies.protocol.learned import learn_case
 from studies.simulation.lanes import SiteConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, seen, tracks_of
 
+pytestmark = pytest.mark.slow
+
 TURNED = replace(KNOCKED, heading_rad=math.radians(7))
 
 

@@ -16,6 +16,8 @@ from studies.simulation.lanes import (
 from studies.simulation.simulated_site import draw_simulated_site
 from tests.models.sites import LENS, PRIOR
 
+pytestmark = pytest.mark.slow
+
 QUIET = SiteConfig(noise_px=0.0, standing_share=0.0, aside_m=0.0)
 
 

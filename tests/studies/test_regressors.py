@@ -32,6 +32,8 @@ from studies.protocol.regressors import prepare_regressors
 from studies.simulation.crowds import FlowConfig
 from studies.simulation.flows import simulate_sites
 
+pytestmark = pytest.mark.slow
+
 NAMES = {"averaged", "calibrated"}
 
 

@@ -16,6 +16,8 @@ from studies.paper import centred_run
 from studies.paper.centred_run import run_averaged
 from tests.studies.test_regressors import tiny_plan
 
+pytestmark = pytest.mark.slow
+
 
 def write_scene(folder, lens, pose, count=40):
     """A scene folder of simulated people."""

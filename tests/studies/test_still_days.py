@@ -16,6 +16,8 @@ from studies.alarms.still_days import MOVES, StillDay, habits_of, report_lines
 from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 from tests.models.sites import LENS, PRIOR
 
+pytestmark = pytest.mark.slow
+
 A_UNIT = 50.0  # of scores, for a radian and for a log
 
 

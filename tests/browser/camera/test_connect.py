@@ -164,6 +164,7 @@ def logged_in(page, token):
     page.locator("#connect dl").wait_for()
 
 
+@pytest.mark.nightly
 def test_a_token_is_made_there_and_posts_for_this_camera_alone(browser, closed, expect, tmp_path):
     server, admin, _ = closed
     (tmp_path / "a.json").write_text(json.dumps({"source": "tracker", "tracks": people(4)}))

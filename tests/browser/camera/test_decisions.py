@@ -21,6 +21,7 @@ def only_alert(bench):
     return bench.http.get(f"/alerts/{alert['id']}").json()
 
 
+@pytest.mark.nightly
 def test_an_alert_is_acknowledged_with_a_name_that_is_asked_for_once(seen, knocked):
     expect = pytest.importorskip("playwright.sync_api").expect
     seen.get_by_role("button", name="Acknowledge").click()

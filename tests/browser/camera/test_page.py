@@ -78,6 +78,7 @@ def test_the_page_is_sound(page, knocked, server, scheme):
         assert axe(page) == [], width
 
 
+@pytest.mark.nightly
 def test_a_still_image_is_put_behind_the_drawing_and_taken_away(browser, tmp_path, migrated):
     expect = pytest.importorskip("playwright.sync_api").expect
     Image.linear_gradient("L").resize((1280, 720)).save(tmp_path / "still.png")

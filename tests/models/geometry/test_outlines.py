@@ -136,6 +136,7 @@ def test_a_line_is_a_line(lens, pose):
     assert (len(gone.corners), gone.in_view) == (0, 0.0)
 
 
+@pytest.mark.nightly
 def test_ellipses_are_those_of_poses_that_are_drawn(lens, pose):
     sd = np.array([math.radians(0.3), math.radians(0.2), 0.02, math.radians(0.2)])
     covariance = np.diag(sd**2)

@@ -39,7 +39,7 @@ def test_a_training_without_an_epoch_is_none(lens, pose):
         )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_short_training_tells_tilt_and_roll_of_single_walks(lens, pose):
     plan = plan_training(
         intrinsics=lens, prior_pose=pose, recipe_name="default", walk=WalkConfig(), seed=0

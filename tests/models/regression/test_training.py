@@ -137,6 +137,7 @@ def test_steps_change_the_weights(plan: TrainingPlan) -> None:
     assert not torch.equal(weights(plan), weights(idle))
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("hardly_checked")
 def test_the_loss_falls_on_the_walks_it_learns_from(plan: TrainingPlan) -> None:
     # Walks of one length are one batch: an epoch is a step.

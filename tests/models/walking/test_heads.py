@@ -66,6 +66,7 @@ def test_upright_people_without_noise_tell_the_pose_itself():
     assert_allclose(np.degrees(found.values), np.degrees(MOVED), atol=0.02)
 
 
+@pytest.mark.nightly
 def test_knocks_are_told_and_intervals_cover_them():
     errors = []
     for seed in range(5):
@@ -139,7 +140,7 @@ def test_two_that_agree_are_surer_and_two_that_do_not_are_less_sure():
     assert_allclose(np.degrees(np.sqrt(unsure[1, 1])), math.sqrt(0.5))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_served_pose_wins_by_heads_and_loses_nothing_by_made_up_ones():
     known, after = tracks_of(5, (PRIOR, 100), (KNOCKED, 40), boxes=True)
     rng = np.random.default_rng(5)

@@ -124,6 +124,7 @@ def test_every_path_answers_as_it_is_documented(watched):
     assert set(watched.app.openapi()["paths"]) - paths == {"/events"}
 
 
+@pytest.mark.nightly
 def test_no_value_in_a_good_body_or_query_is_too_hard_to_take(watched):
     people = {
         "source": "a",

@@ -114,6 +114,7 @@ def test_alerts_are_acknowledged_by_name(running, tmp_path):
     ask(tmp_path, running, "ack", "../cameras", code=2)
 
 
+@pytest.mark.nightly
 def test_a_token_comes_by_a_variable_or_a_file_and_never_by_a_flag(tmp_path, migrated):
     with served(tmp_path, migrated, worker_lost_s=1e6) as server:
         fleet = Fleet(server.settings)
@@ -178,6 +179,7 @@ def test_who_follows_hears_all_of_what_happens_once_across_a_killed_service(runn
     assert ids == list(range(ids[0], ids[-1] + 1))
 
 
+@pytest.mark.nightly
 def test_a_stream_says_what_to_go_on_from_before_anything_happens(running):
     lines = []
     with running.http.stream("GET", "/events") as stream:

@@ -75,6 +75,7 @@ def days_of(street):
     return [] if record.creep is None else list(creep_log_from_bytes(record.creep).day_idx)
 
 
+@pytest.mark.nightly
 def test_the_first_map_stays_as_the_map_grows(known):
     first = anchor(known)
     assert (first.flow, first.chart) == (flow_map(known).data, flow_map(known).chart)
@@ -86,6 +87,7 @@ def test_the_first_map_stays_as_the_map_grows(known):
     assert (kept.flow, kept.chart, kept.to_s) == (first.flow, first.chart, first.to_s)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("default::RuntimeWarning")  # as in a worker
 def test_an_alert_of_the_day_after_an_afternoons_reference_can_be_opened_and_read(http, settings):
     """Its log lay before any ramp: PostgreSQL refused the evidence, SQLite could not read it."""

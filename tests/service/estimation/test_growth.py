@@ -79,6 +79,7 @@ def test_a_map_is_learned_with_its_reference(known):
     assert paths_from_bytes(first.data).density.log_density.shape[3] == 16
 
 
+@pytest.mark.nightly
 def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
     first = map_of(known)
     known.keep_to_lanes(PRIOR, 49 + WINDOW)
@@ -99,6 +100,7 @@ def test_it_grows_by_a_quarter_of_itself_and_by_50_at_the_least(known):
     assert body["estimates"]["registered"]["tracks"] == WINDOW  # by the grown map
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("known", [20 * DAY_S], indirect=True)
 def test_older_tracks_count_less_and_no_more_than_so_many_at_all(known):
     known.clock_s += 10 * DAY_S
@@ -169,6 +171,7 @@ def knocked_and_put_back(known, outcome):
         known.look()
 
 
+@pytest.mark.nightly
 def test_what_was_seen_until_it_was_put_back_never_counts(known):
     knocked_and_put_back(known, "put_back")
     assert known.pose()["state"] == "ok"
@@ -184,6 +187,7 @@ def test_what_was_seen_until_it_was_put_back_never_counts(known):
     assert len(due(known).trajectories) == WANTED + 60 + 60 + 120 - WINDOW
 
 
+@pytest.mark.nightly
 def test_a_reset_answers_what_was_doubted_before(known):
     for _ in range(2):
         known.keep_to_lanes(KNOCKED, 30)

@@ -51,7 +51,7 @@ def pieces(http, settings):
     [
         pytest.param(at_once, id="at once"),
         pytest.param(at_random(1), id="at random", marks=pytest.mark.slow),
-        pytest.param(at_random(2), id="at random again", marks=pytest.mark.slow),
+        pytest.param(at_random(2), id="at random again", marks=pytest.mark.nightly),
     ],
 )
 def test_a_reference_is_of_so_many_people_however_they_were_posted(pieces, sizes):

@@ -91,6 +91,7 @@ def test_a_receiver_down_for_three_tries_and_a_service_killed_between_lose_nothi
     assert len(inbox.received) >= 5  # three that were refused, two that were taken
 
 
+@pytest.mark.nightly
 def test_a_worker_killed_while_it_sends_sends_again_under_the_same_id(service, inbox):
     made = hook(service, inbox.url)
     inbox.answer(204, wait_s=2.0)
@@ -105,6 +106,7 @@ def test_a_worker_killed_while_it_sends_sends_again_under_the_same_id(service, i
     assert len(delivery["attempts"]) == 1  # the first was never written down
 
 
+@pytest.mark.nightly
 def test_a_slow_endpoint_holds_up_no_other(service, inbox):
     with receiver() as slow:
         slow.answer(204, wait_s=8.0)
@@ -115,6 +117,7 @@ def test_a_slow_endpoint_holds_up_no_other(service, inbox):
         assert log(service, first)[0]["state"] == "pending"
 
 
+@pytest.mark.nightly
 def test_the_test_button_reaches_a_receiver(service, inbox):
     made = hook(service, inbox.url)
     service.http.post(f"/webhooks/{made['id']}/test").raise_for_status()
@@ -122,6 +125,7 @@ def test_the_test_button_reaches_a_receiver(service, inbox):
     assert inbox.received[0].verified(made["secret"])["type"] == "test"
 
 
+@pytest.mark.nightly
 def test_an_alertmanager_is_told_again_and_again_with_one_row_in_the_log(service, inbox):
     inbox.answer(200)
     body = {"url": inbox.url, "format": "alertmanager"}

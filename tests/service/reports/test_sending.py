@@ -232,7 +232,7 @@ def test_a_server_that_nobody_vouches_for_is_told_no_password(office, post_offic
     assert "CERTIFICATE_VERIFY_FAILED" in last(office).error
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_worker_killed_while_it_mails_mails_again_and_then_no_more(office, post_office, settings):
     changes = {
         "port": free_port(),

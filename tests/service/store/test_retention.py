@@ -81,6 +81,7 @@ class Room:
         store.close()
 
 
+@pytest.mark.nightly
 def test_fifteen_thousand_tracks_go_down_to_what_is_said_and_so_does_the_file(room):
     room.tracks(15_200, size=2000)
     full = room.size()

@@ -64,6 +64,7 @@ def test_a_quiet_camera_is_looked_at_after_one_turn_of_the_flooded_ones(service)
     wait_for(lambda: service.http.get("/readyz").json()["queue_lag_s"] == 0)
 
 
+@pytest.mark.nightly
 def test_a_training_yields_and_ends_with_its_worker(service):
     service.start_again(training_nice=7)
     service.http.post("/cameras", json=CAMERA).raise_for_status()
@@ -75,6 +76,7 @@ def test_a_training_yields_and_ends_with_its_worker(service):
     wait_for(lambda: not training.is_running(), timeout_s=20)
 
 
+@pytest.mark.nightly
 def test_a_training_that_is_killed_is_tried_again_and_then_fails(service):
     wait_for(service.ready)
     service.http.post("/cameras", json=CAMERA).raise_for_status()

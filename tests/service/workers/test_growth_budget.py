@@ -17,6 +17,7 @@ def known(learned):
     return learned("growth-turns", partial(learn_street, ago_s=20_000.0))
 
 
+@pytest.mark.nightly
 def test_it_leaves_time_for_estimates_that_wait(known, monkeypatch):
     now_s = time.monotonic()
     monkeypatch.setattr(time, "monotonic", lambda: now_s)

@@ -81,6 +81,7 @@ def test_a_look_that_never_ends_ends_its_worker_and_leaves_others_their_turn(sta
     wait_for(lambda: exits.words_of(exits.HANGS) in log_of(service))
 
 
+@pytest.mark.nightly
 def test_a_worker_refused_for_its_name_ends_the_service_with_one_line(start, settings):
     name = worker_name(settings, "local-0")
     lock = (settings.data_dir / f"worker-{name}.lock").open("w")
@@ -106,6 +107,7 @@ def test_a_worker_beyond_its_ceiling_ends_its_jobs_and_is_started_anew(start):
     wait_for(lambda: service.http.get("/cameras/corner/pose").json()["tracks"] == 30)
 
 
+@pytest.mark.nightly
 def test_tracks_posted_while_their_camera_is_looked_at_are_looked_at_too(start):
     service = start()
     wait_for(service.ready)
@@ -122,7 +124,8 @@ def test_tracks_posted_while_their_camera_is_looked_at_are_looked_at_too(start):
     assert log_of(service).count("estimate_stored") < 40
 
 
-@pytest.mark.parametrize("jump_s", [pytest.param(-3600, marks=pytest.mark.nightly), 3600])
+@pytest.mark.nightly
+@pytest.mark.parametrize("jump_s", [-3600, 3600])
 def test_a_clock_that_is_set_stops_nothing_and_doubles_nothing(start, tmp_path, jump_s):
     clock = Clock(tmp_path)
     if clock.environment is None:

@@ -112,6 +112,7 @@ def test_the_api_killed_after_202_has_the_tracks_and_ends_its_workers(service):
     wait_for(lambda: states(service) == ["running"])
 
 
+@pytest.mark.nightly
 def test_a_running_training_is_cancelled_and_a_queued_one_too(service):
     wait_for(service.ready)
     service.http.post("/cameras", json=CAMERA).raise_for_status()
@@ -169,6 +170,7 @@ def test_events_arrive_as_they_happen_and_resume(service):
     assert seen == live[1:]
 
 
+@pytest.mark.nightly
 def test_two_workers_of_one_name_do_not_run_beside_each_other(service, tmp_path):
     wait_for(service.ready)
     words = ["worker", "--name", "local-0"]

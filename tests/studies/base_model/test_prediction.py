@@ -18,6 +18,8 @@ from studies.base_model.segments import Segments, segments_of
 from studies.base_model.stored import load_base_model
 from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
 
+pytestmark = pytest.mark.slow
+
 KNOCK = PoseOffset(tilt_rad=radians(4), roll_rad=radians(-5), log_height=0.1)
 
 

@@ -13,6 +13,8 @@ from studies.base_model.making import held_out_figures
 from studies.base_model.sets import SimulatedSets, SiteRange, sets_before
 from studies.base_model.training import BasePlan, BaseTraining, student_loss
 
+pytestmark = pytest.mark.slow
+
 SMALL = BasePlan(seed=3, rounds=2, cameras=1, sites_each=4, people=12, passes=2, batch=8)
 
 

@@ -18,6 +18,8 @@ from models.simulation.walkers import WalkConfig, Walks
 from studies.baselines import posenet
 from studies.baselines.posenet import TrajectoryPoseNet, draw_walks, parameters_of, train_posenet
 
+pytestmark = pytest.mark.slow
+
 LENS = Intrinsics(width=960, height=540, fx=800, fy=800, cx=479.5, cy=269.5)
 POSE = CameraPose(height_m=6.0, tilt_rad=math.radians(25))
 PLAN = plan_training(
@@ -78,7 +80,6 @@ def test_a_few_steps_bring_it_nearer(toy):
     assert learned < 0.7 * fresh
 
 
-@pytest.mark.slow
 def test_it_learns_a_toy(toy):
     plan, data = toy
     network = train_posenet(plan, alpha=10.0, epochs=16)

@@ -29,6 +29,8 @@ from studies.baselines.scene_coordinates import (
     train_places,
 )
 
+pytestmark = pytest.mark.slow
+
 LENS = Intrinsics(width=960, height=540, fx=1600, fy=1600, cx=479.5, cy=269.5)
 POSE = CameraPose(height_m=6.0, tilt_rad=math.radians(30), heading_rad=0.4, x_m=3.0, y_m=-2.0)
 PLAN = plan_training(
@@ -106,7 +108,6 @@ def test_it_learns_a_toy_whose_pictures_show_their_places():
     assert mean_places_off(network, held_out) < 0.5 * mean_places_off(constant, held_out)
 
 
-@pytest.mark.slow
 def test_of_black_pictures_it_learns_the_mean_place_and_no_pose():
     rng = np.random.default_rng(8)
     data, held_out = patch_set(PLAN, 64, rng), patch_set(PLAN, 64, rng)

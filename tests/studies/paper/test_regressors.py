@@ -12,6 +12,8 @@ from studies.paper.regressors import CONSTANT, run_case
 from studies.paper.regressors_table import REGRESSORS
 from tests.studies.test_partings import scene_of
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def made_up(monkeypatch):

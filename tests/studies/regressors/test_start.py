@@ -14,6 +14,8 @@ from models.regression.recipe import DEFAULT, PAPER
 from studies.regressors.start_training import StartPlan, StartTraining
 from studies.regressors.start_weights import held_out_figures, making_of, store_start
 
+pytestmark = pytest.mark.slow
+
 SMALL = StartPlan(seed=3, rounds=2, cameras=2, walks_each=10, batch=10)
 
 

@@ -4,6 +4,8 @@ import pytest
 
 from studies.code_hash import code_hash
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def write(tmp_path):
