@@ -11,19 +11,19 @@ import sys
 import tempfile
 import time
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import psutil
 
 from service.commands.migrate import migrate
+from service.formats.track import IncomingTrack
 from service.settings import Settings
-from service.store import tracks
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
 from tests.service.street import PRIOR, Street
+from tests.stores.rows import put_tracks
 
 KNOCKED = replace(PRIOR, tilt_rad=PRIOR.tilt_rad + math.radians(8))
 TOLD_S, WORKER_MB = 10.0, 1_000.0
@@ -50,19 +50,9 @@ def poison(running: RunningService, camera_id: str, days: float) -> str:
     body = {"tracks": [{"id": f"posted-{days}", "points": rows.tolist()}]}
     answer = running.http.post(f"/cameras/{camera_id}/tracks", json=body)
     store = Store(running.settings)
-    row = {
-        "camera_id": camera_id,
-        "source": "default",
-        "track_id": f"stored-{days}",
-        "started_s": float(time_s[0]),
-        "ended_s": float(time_s[-1]),
-        "points": tracks.pack(rows),
-        "boxes": None,
-        "heads": None,
-        "received_at": datetime.now(UTC),
-    }
+    stored = IncomingTrack(source="default", track_id=f"stored-{days}", points=rows)
     with store.write(camera_id) as session:
-        tracks.add(session.connection(), [row])
+        put_tracks(session.connection(), camera_id, [stored])
     store.close()
     return f"{answer.status_code} {answer.json()['errors'][0]['reason'].partition(':')[0]}"
 

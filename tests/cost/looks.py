@@ -5,9 +5,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from fastapi.testclient import TestClient
@@ -17,7 +15,6 @@ from service.commands.migrate import migrate
 from service.formats.track import IncomingTrack, Limits, TrackRejectedError, check_track
 from service.job_queue import JobQueue
 from service.settings import Settings
-from service.store import tracks
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
 from service.workers.context import JobContext
@@ -26,6 +23,7 @@ from service.workers.processes.process import give_back, resident_mb
 from tests.conftest import CAMERA
 from tests.cost.drawn import HEIGHT, WIDTH, Crowd, tracks_of
 from tests.service.street import PRIOR, Street
+from tests.stores.rows import put_tracks
 
 WANTED = 60
 LOOK_CPU_S, LOOK_MB = 40.0, 500.0  # of a look: reference, pose and map; and beside what it has
@@ -105,22 +103,8 @@ class Looker:
         )
 
     def _add(self, camera_id: str, found: Sequence[IncomingTrack]) -> None:
-        rows: list[dict[str, Any]] = [
-            {
-                "camera_id": camera_id,
-                "source": "t",
-                "track_id": track.track_id,
-                "started_s": float(track.points[0, 0]),
-                "ended_s": float(track.points[-1, 0]),
-                "points": tracks.pack(track.points),
-                "boxes": None if track.boxes is None else tracks.pack(track.boxes),
-                "heads": None if track.heads is None else tracks.pack(track.heads),
-                "received_at": datetime.now(UTC),
-            }
-            for track in found
-        ]
         with self._context.store.write(camera_id) as session:
-            tracks.add(session.connection(), rows)
+            put_tracks(session.connection(), camera_id, found)
 
 
 class _Walkers(Street):

@@ -1,9 +1,13 @@
 """Rows that a test puts into a store as they are, on whichever database."""
 
+from collections.abc import Iterable
+from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import JSON, Boolean, Column, Connection, DateTime, LargeBinary, String
 
+from service.formats.track import IncomingTrack
+from service.store import tracks
 from service.store.record import Record
 from tests.test_migrations import WORDS
 
@@ -24,6 +28,25 @@ def put_rows(connection: Connection, table: str, rows: list[Row]) -> None:
     marks = ", ".join(f":{name}" if sqlite else f"%({name})s" for name in rows[0])
     names = ", ".join(rows[0])
     connection.exec_driver_sql(f"INSERT INTO {table} ({names}) VALUES ({marks})", rows)
+
+
+def put_tracks(connection: Connection, camera_id: str, found: Iterable[IncomingTrack]) -> None:
+    """Store tracks as they are, whatever a post of them would have been answered."""
+    rows = [
+        {
+            "camera_id": camera_id,
+            "source": track.source,
+            "track_id": track.track_id,
+            "started_s": float(track.points[0, 0]),
+            "ended_s": float(track.points[-1, 0]),
+            "points": tracks.pack(track.points),
+            "boxes": None if track.boxes is None else tracks.pack(track.boxes),
+            "heads": None if track.heads is None else tracks.pack(track.heads),
+            "received_at": datetime.now(UTC),
+        }
+        for track in found
+    ]
+    tracks.add(connection, rows)
 
 
 def _numbered(column: Column[Any]) -> bool:
