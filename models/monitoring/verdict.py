@@ -25,6 +25,10 @@ class MoveProbabilities:
     moved: float
     parameters: Mapping[str, float]
 
+    def of(self, name: str) -> float:
+        """The probability that a parameter changed; 0 where nobody said."""
+        return self.parameters.get(name, 0.0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
@@ -192,20 +196,18 @@ def may_be_told(moved: float, limits: DriftLimits, creep: Creep | None, *, told:
 
 
 def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:
-    """The parameters that certainly moved beyond their floors, in units of these.
+    """The parameters that likelier moved than not, beyond their floors, in units of these.
 
-    A heading may have changed for certain though nobody can tell how far.
+    Of a camera that certainly moved. A heading may be one of them though nobody can tell how far:
+    it counts as just beyond.
     """
     moved = drift.move
     if moved.moved < limits.certainty:
         return {}
-    ratios = {name: drift.ratio(name, limits) for name in drift.identifiable}
-    beyond = {
-        n: ratio for n, ratio in ratios.items() if ratio >= 1 and moved.parameters[n] >= LIKELY
-    }
-    if "heading" not in ratios and moved.parameters.get("heading", 0.0) >= limits.certainty:
-        beyond["heading"] = 1.0
-    return beyond
+    ratios = {name: drift.ratio(name, limits) for name in (*drift.identifiable, "heading")}
+    if "heading" not in drift.identifiable:
+        ratios["heading"] = min(ratios["heading"], 1.0)
+    return {n: ratio for n, ratio in ratios.items() if ratio >= 1 and moved.of(n) >= LIKELY}
 
 
 def _is_well(drift: Drift, limits: DriftLimits) -> bool:
@@ -221,7 +223,7 @@ def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) ->
         "floor_rad": limits.floor_rad,
         "floor_m": limits.floor_m,
     }
-    if not drift.identifiable:
+    if not drift.identifiable and verdict.excess < 1:
         code = TracksCode.BEYOND_LIMITS_LAST_IDENTIFIABLE
         return Reason(code=code, values=values) if verdict.drifting else None
     for name in drift.identifiable:

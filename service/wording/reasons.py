@@ -77,10 +77,11 @@ def _numbers(v: _Values) -> str:
             by, sd = v[f"{name}_deg"], v[f"{name}_sd_deg"]
             words = _(_NUMBERS[name])
             said.append(_("{number} {by:+.2f} deg (sd {sd:.2f})", number=words, by=by, sd=sd))
+    share = percent(v["moved"])
+    if not said:
+        return _("moved: {share}", share=share)
     return _(
-        "{numbers} against the prior pose; moved: {share}",
-        numbers=", ".join(said),
-        share=percent(v["moved"]),
+        "{numbers} against the prior pose; moved: {share}", numbers=", ".join(said), share=share
     )
 
 

@@ -22,8 +22,7 @@ PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), headi
 LIMITS = DriftLimits(
     certainty=0.99, floor_rad=math.radians(2), floor_m=0.5, people=12, clear_ratio=0.7
 )
-# A heading that is not told may not be said to have changed for certain.
-SURE = MoveProbabilities(moved=1.0, parameters={**dict.fromkeys(PARAMETERS, 1.0), "heading": 0.9})
+SURE = MoveProbabilities(moved=1.0, parameters=dict.fromkeys(PARAMETERS, 1.0))
 
 
 THREE = ("tilt", "roll", "height")
@@ -95,8 +94,8 @@ def test_a_told_heading_is_a_drift_clockwise_positive():
     verdict = judge(found, LIMITS, ())
     assert verdict.drifted == ("heading",)
     assert verdict.excess == pytest.approx(2.5)
-    panned = drift(heading_deg=5)
-    assert (panned.angle_rad, judge(panned, LIMITS, ()).drifted) == (0.0, ())
+    panned = drift(heading_deg=5)  # not told: a drift that nobody can say the size of
+    assert (panned.angle_rad, judge(panned, LIMITS, ()).drifted) == (0.0, ("heading",))
     assert pose_after(panned, PRIOR).heading_rad == PRIOR.heading_rad
 
 
@@ -160,15 +159,15 @@ def test_the_chart_is_heeded_at_once_and_holds_until_both_are_calm():
     assert judge(unknown, LIMITS, (), charted(10.5)).drifting
 
 
-def test_a_heading_that_certainly_changed_is_a_drift_though_nobody_can_tell_how_far():
-    untold = drift(unidentifiable=("heading",), move=likely(1.0, heading=0.995))
+def test_a_heading_that_likelier_changed_is_a_drift_though_nobody_can_tell_how_far():
+    untold = drift(heading_deg=12, move=likely(0.99, heading=0.6))
     verdict = judge(untold, LIMITS, ())
     assert (verdict.drifted, verdict.excess) == (("heading",), 1.0)
-    assert not judge(
-        drift(unidentifiable=("heading",), move=likely(1.0, heading=0.9)), LIMITS, ()
-    ).drifting
-    # Of people who tell nothing else, too.
-    nothing = drift(unidentifiable=PARAMETERS, move=likely(1.0, heading=0.995))
+    assert not drifting(drift(heading_deg=12, move=likely(0.98, heading=0.98)))
+    assert not drifting(drift(heading_deg=12, move=likely(0.99, roll=0.9, heading=0.4)))
+    assert not drifting(drift(heading_deg=1.9, move=likely(0.99, heading=0.98)))
+    # Of people who tell nothing else, too: 40 of a corridor that was panned by 60 deg.
+    nothing = drift(8, 9, heading_deg=16, unidentifiable=THREE, move=likely(1.0, heading=0.92))
     assert judge(nothing, LIMITS, ()).drifted == ("heading",)
 
 

@@ -41,6 +41,7 @@ SAID = [
     (T.BEYOND_LIMITS, {**LIMITS, "moved": 0.9954, **TILT},
      "tilt +3.10 deg (sd 0.30) against the prior pose; moved: 99.5 %, "
      "by more than 0.5 deg or 0.2 m"),
+    (T.BEYOND_LIMITS, {**LIMITS, **SURE}, "moved: over 99.9 %, by more than 0.5 deg or 0.2 m"),
     (T.SUSPECTED, {**LIMITS, **MAYBE, **TILT},
      "tilt +3.10 deg (sd 0.30) against the prior pose; moved: 87 %, "
      "which is not sure enough for an alert"),
@@ -239,6 +240,7 @@ DRIFT = Drift(
         (0.0, (), DRIFT.identifiable, 0.5, T.SUSPECTED),
         (0.0, (), DRIFT.identifiable, 0.49, T.WITHIN_LIMITS),
         (0.0, ("tilt",), (), 0.999, T.BEYOND_LIMITS_LAST_IDENTIFIABLE),
+        (1.0, ("heading",), (), 0.999, T.BEYOND_LIMITS),
     ],
 )
 def test_a_verdict_gives_what_is_identifiable_as_its_reason(
