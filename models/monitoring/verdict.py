@@ -25,10 +25,6 @@ class MoveProbabilities:
     moved: float
     parameters: Mapping[str, float]
 
-    def of(self, name: str) -> float:
-        """The probability that a parameter changed; 0 where nobody said."""
-        return self.parameters.get(name, 0.0)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
@@ -207,7 +203,7 @@ def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:
     ratios = {name: drift.ratio(name, limits) for name in (*drift.identifiable, "heading")}
     if "heading" not in drift.identifiable:
         ratios["heading"] = min(ratios["heading"], 1.0)
-    return {n: ratio for n, ratio in ratios.items() if ratio >= 1 and moved.of(n) >= LIKELY}
+    return {n: r for n, r in ratios.items() if r >= 1 and moved.parameters[n] >= LIKELY}
 
 
 def _is_well(drift: Drift, limits: DriftLimits) -> bool:

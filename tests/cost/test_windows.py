@@ -37,7 +37,7 @@ def test_no_window_is_beyond_the_budget_of_a_look(tmp_path):
     with looker(tmp_path / "data") as found:
 
         @settings(
-            max_examples=4, deadline=None, database=None, suppress_health_check=list(HealthCheck)
+            max_examples=8, deadline=None, database=None, suppress_health_check=list(HealthCheck)
         )
         @given(windows(most_points=20_000))
         def look(window):
