@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from dbos import DBOS, DBOSClient, DBOSConfig, DBOSPortableJSONSerializer, error
 from dbos._serialization import DefaultSerializer  # private; pinned, see _refuse_pickle
-from sqlalchemy import Engine, TextClause, select, text
+from sqlalchemy import Engine, TextClause, bindparam, select, text
 from sqlalchemy.orm import Session
 
 from service.settings import Settings
@@ -71,6 +71,11 @@ _ANY_WAITS = text(
 _STATUS = text(
     "SELECT status FROM workflow_status WHERE workflow_uuid = :id OR workflow_uuid LIKE :again"
 )
+# As the engine's own recovery does, which would have a transaction of its own.
+_REQUEUE = text(
+    "UPDATE workflow_status SET status = 'ENQUEUED', owner_xid = NULL, started_at_epoch_ms = NULL "
+    "WHERE status = 'PENDING' AND executor_id IN :workers"
+).bindparams(bindparam("workers", expanding=True))
 
 
 class JobQueue:
@@ -132,6 +137,10 @@ class JobQueue:
         """
         if session.scalar(_WAITS, {"queue": DELIVER_JOB, "key": webhook_id}) is None:
             self._enqueue(session, DELIVER_JOB, webhook_id, queue_partition_key=webhook_id)
+
+    def requeue_of(self, session: Session, workers: Sequence[str]) -> None:
+        """Give the unfinished jobs of lost workers back to the queue."""
+        session.execute(_REQUEUE, {"workers": list(workers)})
 
     def close(self) -> None:
         """Let go of the engine's connections."""

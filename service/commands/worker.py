@@ -101,17 +101,18 @@ def run_worker(
 def _mind(context: JobContext, name: str) -> int:
     """Beat, take over from lost workers, keep below the ceiling; returns the exit status."""
     watch, settings = Watch(), context.settings
+    lost_s = settings.worker_lost_s
     trimmed_s, draining = time.monotonic(), None
     while not context.stopping.wait(BEAT_S):
         try:
             with context.store.write(WORKERS) as session:
                 alive = heartbeat(session, name, os.getpid())
-                lost = watch.take_lost(session, settings.worker_lost_s) if alive else []
+                lost = watch.take_lost(session, context.queue, lost_s) if alive else []
             if not alive:
                 log.error("worker_given_up", extra={"worker": name})
                 return exits.GIVEN_UP
-            if lost and draining is None:
-                engine.take_over(lost)
+            if lost:
+                log.warning("workers_lost", extra={"workers": lost})
         except (
             SQLAlchemyError,
             OverloadedError,

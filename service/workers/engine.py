@@ -1,4 +1,4 @@
-"""The engine in a worker process: which jobs it runs, taking over, forgetting, stopping."""
+"""The engine in a worker process: which jobs it runs, forgetting those that ended, stopping."""
 
 import logging
 import threading
@@ -6,7 +6,6 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from dbos import DBOS
-from dbos._recovery import recover_pending_workflows  # private; pinned, see take_over
 
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, engine_config
 from service.workers.context import JobContext
@@ -75,18 +74,6 @@ def launch(context: JobContext, name: str, only: WorkKind | None = None) -> None
         polling_interval_sec=_POLL_DELIVERIES_S,
         on_conflict="always_update",
     )
-
-
-def take_over(lost: list[str]) -> None:
-    """Give the unfinished jobs of lost workers back to the queue.
-
-    The engine offers this only with its paid conductor; the call is private, so the version is
-    pinned and `tests/service/workers/test_processes.py` kills a worker to try it.
-    """
-    from dbos._dbos import _get_dbos_instance
-
-    log.warning("workers_lost", extra={"workers": lost})
-    recover_pending_workflows(_get_dbos_instance(), lost)
 
 
 def forget_finished() -> int:

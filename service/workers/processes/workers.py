@@ -7,6 +7,7 @@ from datetime import timedelta
 
 from sqlalchemy.orm import Session
 
+from service.job_queue import JobQueue
 from service.settings import Settings
 from service.store import workers
 from service.store.engines.dialects import now_in
@@ -77,8 +78,12 @@ class Watch:
     def __init__(self) -> None:
         self._seen: dict[str, tuple[int, float]] = {}
 
-    def take_lost(self, session: Session, lost_s: float) -> list[str]:
-        """Names of workers that have fallen silent; among all watchers each is named once."""
+    def take_lost(self, session: Session, queue: JobQueue, lost_s: float) -> list[str]:
+        """Names of workers that have fallen silent; among all watchers each is named once.
+
+        Their unfinished jobs are the queue's again, in this transaction: given back after it, they
+        would be taken from a process of that name that has just started, and has begun them anew.
+        """
         now_s = time.monotonic()
         seen, lost = {}, []
         for record in workers.every(session):
@@ -93,5 +98,7 @@ class Watch:
             else:
                 seen[record.name] = (record.beats, since_s)
         self._seen = seen
+        if lost:
+            queue.requeue_of(session, lost)
         workers.forget_lost(session, now_in(session) - _FORGET_LOST)
         return lost

@@ -5,7 +5,9 @@ from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 
 import pytest
+from sqlalchemy import text
 
+from service.job_queue import queue_of
 from service.store.engines.store import Store
 from service.store.workers import WorkerRecord
 from service.workers.context import RunningJobs
@@ -25,13 +27,13 @@ def session(settings):
 
 
 def test_a_worker_that_shows_no_sign_of_life_is_lost_and_named_once(session):
-    first, second = Watch(), Watch()
-    assert first.take_lost(session, LOST_S) == second.take_lost(session, LOST_S) == []
+    first, second, queue = Watch(), Watch(), queue_of(session)
+    assert not any(watch.take_lost(session, queue, LOST_S) for watch in (first, second))
     time.sleep(1.5 * LOST_S)
     assert heartbeat(session, "two", 2)
-    assert first.take_lost(session, LOST_S) == ["one"]
+    assert first.take_lost(session, queue, LOST_S) == ["one"]
     session.flush()
-    assert second.take_lost(session, LOST_S) == []
+    assert second.take_lost(session, queue, LOST_S) == []
     assert not heartbeat(session, "one", 1)  # its jobs are others' now: it has to end
     register_worker(session, "one", 11)
     session.flush()
@@ -39,18 +41,35 @@ def test_a_worker_that_shows_no_sign_of_life_is_lost_and_named_once(session):
     assert session.get(WorkerRecord, "one").starts == 2
 
 
+def test_the_jobs_of_a_lost_worker_are_the_queues_again_in_the_same_transaction(session):
+    """One that starts under its name right after it begins them, and they are not taken from it."""
+    watch, queue = Watch(), queue_of(session)
+    for name in ("one", "two"):
+        queue.enqueue_estimate(session, name, datetime.now(UTC))
+        begun = "UPDATE workflow_status SET status = 'PENDING', executor_id = :name"
+        session.execute(text(f"{begun} WHERE deduplication_id = :name"), {"name": name})
+    watch.take_lost(session, queue, LOST_S)
+    time.sleep(1.5 * LOST_S)
+    assert heartbeat(session, "two", 2)
+    assert watch.take_lost(session, queue, LOST_S) == ["one"]
+    jobs = dict(session.execute(text("SELECT deduplication_id, status FROM workflow_status")).all())
+    assert jobs == {"one": "ENQUEUED", "two": "PENDING"}
+    session.rollback()
+    assert not session.execute(text("SELECT 1 FROM workflow_status")).all()
+
+
 @pytest.mark.parametrize("hours", [1, -1])
 def test_a_clock_that_jumps_makes_nobody_lost(session, hours):
     watch, lost_s = Watch(), 600.0  # longer than two questions take anywhere
-    watch.take_lost(session, lost_s)
+    watch.take_lost(session, queue_of(session), lost_s)
     for name in ("one", "two"):  # what they wrote before the jump
         session.get(WorkerRecord, name).heartbeat_at = datetime.now(UTC) - timedelta(hours=hours)
-    assert watch.take_lost(session, lost_s) == []
+    assert watch.take_lost(session, queue_of(session), lost_s) == []
 
 
 def test_who_watches_anew_waits_anew(session):
     time.sleep(1.5 * LOST_S)
-    assert Watch().take_lost(session, LOST_S) == []
+    assert Watch().take_lost(session, queue_of(session), LOST_S) == []
 
 
 def test_a_worker_that_cannot_be_kept_alive_is_told(http, settings):
