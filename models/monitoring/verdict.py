@@ -165,8 +165,8 @@ def judge(
     beyond = _beyond(drift, limits) if enough else {}
     if not drift.identifiable and chart is None and not crept and not beyond:
         return DriftVerdict(streak=0, excess=0.0, drifted=drifted)
-    borne_out = chart is not None and chart.moved and drift.move.moved >= config.BORNE_OUT
-    alarmed = (_CHARTED[chart.parameter],) if chart is not None and borne_out else crept
+    charted = chart is not None and chart.moved and _bears_out(drift, limits)
+    alarmed = (_CHARTED[chart.parameter],) if chart is not None and charted else crept
     calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, creep))
     known = set(drift.identifiable) if chart is None else set(PARAMETERS)
     well = enough and calm and set(drifted) <= known and _is_well(drift, limits)
@@ -189,6 +189,16 @@ def may_be_told(moved: float, limits: DriftLimits, creep: Creep | None, *, told:
     """False where `judge` can tell no drift, whatever else it is given; `told` one before."""
     crept = creep is not None and creep.moved
     return told or crept or moved >= min(config.BORNE_OUT, limits.certainty)
+
+
+def _bears_out(drift: Drift, limits: DriftLimits) -> bool:
+    """True where a pose bears an alarm of the chart out.
+
+    A height within its floor alone does not: people who hurry for an hour look like one.
+    """
+    angle = max(drift.move.parameters[name] for name in ANGLES)
+    other = angle >= LIKELY or drift.ratio("height", limits) >= 1
+    return drift.move.moved >= config.BORNE_OUT and other
 
 
 def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:

@@ -173,10 +173,18 @@ def test_a_heading_that_likelier_changed_is_a_drift_though_nobody_can_tell_how_f
 
 def test_an_alarm_of_the_chart_counts_where_the_pose_bears_it_out():
     for moved, alarmed in ((0.89, False), (0.91, True)):
-        verdict = judge(drift(move=likely(moved)), LIMITS, (), charted(10.5))
+        turned = likely(moved, heading=0.5)
+        verdict = judge(drift(move=turned), LIMITS, (), charted(10.5))
         assert (verdict.alarmed, verdict.drifting) == (alarmed, alarmed)
     # A drift that was told before lasts while the chart alarms, whatever bears it out.
     assert judge(drift(move=likely(0.1)), LIMITS, ("heading",), charted(10.5)).drifting
+
+
+def test_people_who_hurry_for_an_hour_bear_no_alarm_of_the_chart_out():
+    """They look like a camera that is a little higher: as 400 of a mall's at half past four do."""
+    hour = likely(0.98, height=0.98, tilt=0.4)
+    assert not judge(drift(height_m=6.3, move=hour), LIMITS, (), charted(10.5)).drifting
+    assert judge(drift(height_m=6.6, move=hour), LIMITS, (), charted(10.5)).drifting
 
 
 def test_what_drifted_has_to_be_told_to_end():
