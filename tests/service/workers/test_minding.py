@@ -54,11 +54,11 @@ def test_a_worker_that_is_stopped_cold_is_ended_and_replaced(start):
     os.kill(stopped, signal.SIGSTOP)  # as one that hangs in native code: no thread of it runs
     wait_for(lambda: "worker_hangs" in log_of(service), timeout_s=30)
     wait_for(lambda: not pid_exists(stopped))
-    wait_for(service.ready)
-    assert service.worker_pid() != stopped
-    text = service.http.get("/metrics").text
     name = worker_name(service.settings, "local-0")
-    assert f'surefoot_worker_restarts_total{{worker="{name}"}} 1.0' in text
+    again = f'surefoot_worker_restarts_total{{worker="{name}"}} 1.0'
+    wait_for(lambda: again in service.http.get("/metrics").text)
+    assert service.worker_pid() != stopped
+    wait_for(service.ready)
 
 
 HANGS = """
