@@ -25,7 +25,13 @@ _KNOCKS = {
     "height-alone": "height alone",
     "pan-alone": "pan alone",
 }
-_MOVES = {"still": "still", "pan-2": "pan by 2 deg", "pan": "all four"}
+_MOVES = {
+    "still": "still",
+    "tilt-2": "tilt by 2 deg",
+    "roll-2": "roll by 2 deg",
+    "pan-2": "pan by 2 deg",
+    "pan": "all four",
+}
 _SHOWN = (
     "whole rotation, deg",
     "height",

@@ -42,7 +42,9 @@ _KNOCKS = {
 }
 FEW = (8, 15, 20, 40)  # tracks
 FAR_DEG = (12, 20, 30, 45, 60, 90, 120, 150, 180)  # pans, both ways
-MOVES = ("still", "pan-2", "pan")
+_TURNED_RAD = math.radians(2)  # of one angle, in a long replay
+_TURNED = {"tilt-2": "tilt_rad", "roll-2": "roll_rad", "pan-2": "heading_rad"}
+MOVES = ("still", *_TURNED, "pan")
 LATER = tuple(name for name, fault in FAULTS.items() if fault.later)
 _LONG = 1500  # tracks; of longer recordings parts are taken
 _SIZES = ((200, 100), (1000, 400))
@@ -243,8 +245,9 @@ def _served(
 def _replayed(scene: Scene, case_id: CaseId, plan: ReplayPlan) -> ReplayOutcome:
     rng = np.random.default_rng([case_id.seed, 1])
     knock: PoseOffset | None = None
-    if case_id.knock == "pan-2":
-        knock = PoseOffset(heading_rad=float(rng.choice([-1, 1]) * np.radians(2)))
+    if case_id.knock in _TURNED:
+        turn = float(rng.choice([-1, 1])) * _TURNED_RAD
+        knock = PoseOffset(**{_TURNED[case_id.knock]: turn})
     elif case_id.knock == "pan":
         tilt, roll, log_height, heading = rng.uniform(-1, 1, 4)
         knock = PoseOffset(

@@ -1,6 +1,7 @@
 """`python -m studies protocol`: outcomes outlive an end, tables say what they come to."""
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -12,12 +13,14 @@ from pathlib import Path
 import pytest
 
 from models.errors import ShapeError
+from models.simulation.poses import PoseOffset
 from studies.pages import write_between
+from studies.served import tasks
 from studies.served.outcome_file import OutcomeFile
 from studies.served.outcomes import ParameterOutcome, ServedOutcome
 from studies.served.replays import ReplayOutcome, Stretch
 from studies.served.tables import BETWEEN, all_tables
-from studies.served.tasks import CaseId, CaseResult, Table, tasks_of
+from studies.served.tasks import CaseId, CaseResult, Table, Task, tasks_of, work
 from tests.studies.test_partings import scene_of
 
 NUMBER = ParameterOutcome(moved=2.0, error=0.25, sd=0.5, identifiable=True, covered=True)
@@ -257,3 +260,23 @@ def test_a_study_that_was_ended_goes_on_and_writes_its_page(tmp_path):
 
 def _lines(path: Path) -> int:
     return path.read_text().count("\n")
+
+
+@pytest.mark.parametrize(
+    ("knock", "turned"), [("tilt-2", "tilt_rad"), ("roll-2", "roll_rad"), ("pan-2", "heading_rad")]
+)
+def test_a_long_replay_turns_one_angle_by_two_degrees_either_way(monkeypatch, knock, turned):
+    knocks: list[PoseOffset] = []
+
+    def replayed(scene, offset, *_):
+        knocks.append(offset)
+        return REPLAYED
+
+    monkeypatch.setattr(tasks, "_cameras", lambda _: [None])
+    monkeypatch.setattr(tasks, "replay", replayed)
+    asked = tuple(replace(REPLAY, knock=knock, seed=seed) for seed in range(8))
+    found = work(Task(folder=Path(), camera=0, case_ids=asked), plan=None)
+    assert [each.outcome for each in found] == [REPLAYED] * 8
+    sizes = {getattr(each, turned) for each in knocks}
+    assert sizes == {math.radians(2), -math.radians(2)}
+    assert all(replace(each, **{turned: 0.0}) == PoseOffset() for each in knocks)
