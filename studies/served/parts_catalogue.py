@@ -15,6 +15,11 @@ from models.paths.map_learning import Bandwidths
 _ROOT = Path(__file__).parents[2]
 _FEW_AND_FAR = ("few", "far")
 _COARSE = Bandwidths(place_m=1.0, direction_kappa=6.0)
+_SEARCH = (
+    "ChangeSearch", "search_change", "_confirmed", "_still_there", "_suspicion", "_suspects",
+    "_moved_by_speeds", "_moved_by_places",
+)  # fmt: skip
+_TESTS_OF_PLACES = ("StillScores", "learn_scores", "moved_within", "_highest", "_squared")
 
 
 def _none_of_points(uv_or_time: Any, *_: Any) -> Any:
@@ -91,19 +96,19 @@ PARTS: dict[str, Part] = {
     "hidden feet": Part(
         words="boxes whose feet are hidden are found by their heights",
         off=(("models.tracks.walks:short_boxes", _none_of_points),),
-        source=("models/tracks/hidden_feet.py",),
+        source=("models.tracks.hidden_feet:short_boxes", "models.tracks.hidden_feet:_off_the_line"),
         faults=("hidden-feet",),
     ),
     "jumps": Part(
         words="points that jump away and back are left out",
         off=(("models.tracks.walks:jumped", _none_of_points),),
-        source=("models/tracks/hidden_feet.py",),
+        source=("models.tracks.hidden_feet:jumped", "models.tracks.hidden_feet:_middle_of_five"),
         faults=("jumps", "jumps-later"),
     ),
     "pieces": Part(
         words="pieces of one walk are put together",
         off=(("models.tracks.walks:link_pieces", _alone),),
-        source=("models/tracks/linking.py", "models/tracks/linking.py"),
+        source=("models/tracks/linking.py",),
         faults=("fragments",),
     ),
     "walking groups": Part(
@@ -117,7 +122,11 @@ PARTS: dict[str, Part] = {
     "noise of directions": Part(
         words="information that is noise of directions is taken off",
         off=(("models.walking.fit:noise_information", _nothing(3)),),
-        source=("models/walking/fit.py",),
+        source=(
+            "models.walking.fit:noise_information",
+            "models.walking.fit:corrected_covariance",
+            "models.walking.fit:information_of_noise",
+        ),
     ),
     "freedom of the field": Part(
         words="how freely speeds vary by place is chosen by halves",
@@ -179,10 +188,9 @@ PARTS: dict[str, Part] = {
         words="a window begins anew at a change",
         off=(("models.pose.estimating:_suspects", lambda *_: iter(())),),
         source=(
-            "models/pose/estimating.py",
+            *(f"models.pose.estimating:{name}" for name in _SEARCH),
             "models/pose/change_point.py",
-            "models/pose/change_point.py",
-            "models/paths/path_tests.py",
+            *(f"models.paths.path_tests:{name}" for name in _TESTS_OF_PLACES),
         ),
     ),
 }
