@@ -123,6 +123,7 @@ table(
     *needed(DateTime, "created_at"),
     one_of("origin", "registered changed accepted assumed agreed"),
     Index(None, "camera_id", "id"),
+    sqlite_autoincrement=True,
 )
 table(
     "proposed_poses",
@@ -228,6 +229,7 @@ table(
     one_of("origin", "assumed agreed registered changed accepted reset put_back source"),
     one_of("answer", "put_back mended false_alarm"),
     Index(None, "camera_id", "id"),
+    sqlite_autoincrement=True,
 )
 table(
     "flow_maps",

@@ -1,6 +1,7 @@
 """Open, update and end alerts; one is open for a camera and kind, or for a group."""
 
 import secrets
+from collections import Counter
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
@@ -150,7 +151,10 @@ def close_alert(
     group = None if record.group_id is None else session.get(AlertRecord, record.group_id)
     over = group is not None and not alerts.firing_members(session, group.id)
     if group is not None and group.state == AlertState.FIRING and over:
-        close_alert(session, group, outcome, note, by)
+        came = Counter(alerts.outcomes_of(session, group.id))
+        # That of most members; of as many, the last one's.
+        of_most = max(came, key=lambda each: (came[each], each == outcome))
+        close_alert(session, group, of_most, note, by)
 
 
 def reopen_alert(session: Session, record: AlertRecord, by: str | None) -> None:

@@ -57,7 +57,7 @@ def load_arrivals(session: Session, camera_id: str, now: datetime) -> Arrivals |
     kept = session.get(RhythmRecord, camera_id)
     if session.get(CameraRecord, camera_id) is None:
         return None
-    if kept is not None and now - kept.learned_at < _NOT_AGAIN_WITHIN:
+    if kept is not None and abs(now - kept.learned_at) < _NOT_AGAIN_WITHIN:
         return None
     rows = tracks.arrivals(session, camera_id, now - timedelta(days=_PAST_DAYS))
     outages = [

@@ -27,17 +27,22 @@ class StaleWatch:
 
     def __init__(self) -> None:
         # The oldest track of a camera that nothing has looked at, and since when it is watched.
-        self._waiting: dict[str, tuple[int, float]] = {}
+        self._waiting: dict[str, tuple[int, float]] | None = None
 
     def watch(self, session: Session, settings: Settings) -> dict[str, str]:
         """Bring all alerts `stale` up to date; says of whom it opened or ended one."""
         now_s = time.monotonic()
+        firing = alerts.firing_codes(session, AlertKind.STALE)
+        unseen = tracks.unseen_since(session)
+        if self._waiting is None:  # another worker may have told of some, which wait still
+            told_s = now_s - settings.stale_after_s - 1
+            told = {id_ for id_, code in firing.items() if code == ServiceCode.TRACKS_WAIT}
+            self._waiting = {id_: (unseen[id_][0], told_s) for id_ in told & unseen.keys()}
         waiting = {}
-        for camera_id, (pk, _) in tracks.unseen_since(session).items():
+        for camera_id, (pk, _) in unseen.items():
             known_pk, since_s = self._waiting.get(camera_id, (pk, now_s))
             waiting[camera_id] = pk, since_s if known_pk == pk else now_s
         self._waiting = waiting
-        firing = alerts.firing_codes(session, AlertKind.STALE)
         found: dict[str, str] = {}
         waits = {camera_id: now_s - since_s for camera_id, (_, since_s) in self._waiting.items()}
         long = {camera_id for camera_id, s in waits.items() if s > settings.stale_after_s}

@@ -14,6 +14,7 @@ from models.geometry.pose import CameraPose
 from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
+from service.cameras.held_poses import held_pose, keep_drawn
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import Activity, AlertState, Origin, Outcome, PoseState
@@ -186,7 +187,8 @@ def list_cameras(
 
 def etag_of(record: CameraRecord) -> str:
     """Changes whenever the camera's own fields do."""
-    return f'"{record.id}-{record.version}"'
+    made_us = round(record.created_at.timestamp() * 1e6)  # another may have had the id before
+    return f'"{record.id}-{made_us:x}-{record.version}"'
 
 
 def change_camera(
@@ -213,6 +215,8 @@ def change_camera(
         if getattr(change, field.name) is not None
     }
     lens = {} if change.intrinsics is None else _columns(change.intrinsics)
+    size = record.width, record.height
+    resized = (lens.get("width", size[0]), lens.get("height", size[1])) != size
     for name, value in {**changed, **lens}.items():
         if name not in ("intrinsics", "prior_pose"):
             setattr(record, name, value)
@@ -238,11 +242,29 @@ def change_camera(
         prior = cameras.prior_pose(session, camera_id)
         pose, origin = change.prior_pose or prior.pose, Origin.CHANGED
         given: Sequence[str] = ()
-        if change.prior_pose is None and prior.assumed:
-            origin, given = Origin.ASSUMED, prior.given
+        covariance: list[list[float]] | None = None
+        if change.prior_pose is None:  # how sure it is, and what was marked, stays
+            covariance = prior.covariance
+            if prior.assumed:
+                origin, given = Origin.ASSUMED, prior.given
+        held = held_pose(session, camera_id)
         renew_prior_pose(
-            session, queue, settings, camera_id, pose, origin, from_s=from_s, by=by, given=given
+            session,
+            queue,
+            settings,
+            camera_id,
+            pose,
+            origin,
+            from_s=from_s,
+            by=by,
+            given=given,
+            covariance=covariance,
         )
+        now = cameras.prior_pose(session, camera_id)
+        if now.assumed and not resized:
+            now.hints = prior.hints
+        if held.assumed and not now.assumed:
+            keep_drawn(session, camera_id, held)
     words = {name: value for name, value in changed.items() if name in _DESCRIBING}
     # An answer about the pose can be taken back after other words for the camera.
     what = Activity.CAMERA_CHANGED if len(words) < len(changed) else Activity.CAMERA_DESCRIBED

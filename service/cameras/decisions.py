@@ -9,9 +9,8 @@ from service.access.activity import note as note_activity
 from service.alerts.alerts import close_alert, close_pose_alerts, require_firing
 from service.cameras.answers import Decision, state_before
 from service.cameras.cameras import renew_prior_pose, require_camera
-from service.cameras.held_poses import held_pose
+from service.cameras.held_poses import held_pose, keep_drawn
 from service.cameras.poses import PoseView, view_pose
-from service.cameras.zones import keep_drawn
 from service.enums import Activity, AlertKind, AlertState, Answer, Origin, Outcome
 from service.errors import ConflictError, MalformedError
 from service.estimate_queue import request_estimate

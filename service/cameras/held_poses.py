@@ -14,7 +14,7 @@ from models.geometry.pose import PARAMETERS, CameraPose
 from models.geometry.propagation import restricted
 from models.geometry.rotation import Array
 from service.enums import PoseState
-from service.store import alerts, cameras, estimates
+from service.store import alerts, cameras, estimates, zones
 from service.store.cameras import PriorPoseRecord
 from service.store.estimates import EstimateRecord
 
@@ -69,6 +69,26 @@ def held_pose(session: Session, camera_id: str, at: datetime | None = None) -> H
         return _held(prior, since=since, drifted=True)
     prior = session.get_one(PriorPoseRecord, found.prior_pose_id)
     return _held(prior, found, since=since, drifted=True)
+
+
+def keep_drawn(session: Session, camera_id: str, held: HeldPose) -> None:
+    """Have zones stand as drawn at a new prior pose, where the camera stood when they were drawn.
+
+    That is so of zones since the drift whose pose is accepted, by an estimate of it: each one is a
+    little elsewhere, and the camera was not. And of those from before anybody had agreed to a pose.
+
+    Args:
+        session: of a store.
+        camera_id: of the camera.
+        held: the pose that held until then.
+    """
+    record = zones.of_camera(session, camera_id)
+    if record is None:
+        return
+    since_drift = held.drifted and record.covariance is not None and record.drawn_at >= held.since
+    if held.assumed or since_drift:
+        prior = cameras.prior_pose(session, camera_id)
+        record.prior_pose_id, record.pose, record.covariance = prior.id, asdict(prior.pose), None
 
 
 def _four(covariance: list[list[float]]) -> Array:

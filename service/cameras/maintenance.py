@@ -92,7 +92,7 @@ def change_window(
     """
     record = _require(session, camera_id, window_id)
     now = datetime.now(UTC)
-    _check(from_at or record.from_at, to_at or record.to_at, now, settings)
+    _check(from_at or record.from_at, to_at or record.until, now, settings)
     if to_at is not None:
         record.to_at, record.ended_at = to_at, to_at if to_at <= now else None
     record.from_at, record.updated_at = from_at or record.from_at, now

@@ -1,5 +1,6 @@
 """Take in tracks; and a process's memory of the cameras that are posted to and looked at."""
 
+import math
 import threading
 import time
 from dataclasses import dataclass
@@ -76,7 +77,7 @@ class Quota:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._most = settings.keep_mb * 1e6 * _BEYOND
+        self._most = settings.keep_mb * 1e6 * _BEYOND or math.inf  # 0: any
         self._counts: dict[str, _Count] = {}
         self._lock = threading.Lock()
 

@@ -31,6 +31,7 @@ from service.training import stop_trainings, train_by_itself
 UNDO_WITHIN = timedelta(minutes=15)  # people who came since tell by then, and learning has begun
 # After these there is no going back to what was before an answer.
 _BARRIERS = (
+    Activity.CAMERA_REGISTERED,  # another may have had the id before
     Activity.POSE_UNDONE,
     Activity.POSE_AGREED,
     Activity.CAMERA_CHANGED,

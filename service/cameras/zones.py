@@ -18,7 +18,7 @@ from service.enums import Activity, ZoneOn
 from service.errors import MalformedError, check_version
 from service.formats.zone_formats import ZoneFormat, is_cut, read_zones, write_zones
 from service.formats.zones import Corner, Zone
-from service.store import cameras, zones
+from service.store import zones
 from service.store.cameras import PriorPoseRecord
 from service.store.zones import ZonesRecord
 
@@ -130,26 +130,6 @@ def draw_zones(
     note(session, Activity.ZONES_DRAWN, by=None, camera_id=camera_id, details=details)
     session.flush()
     return view_zones(session, camera_id)
-
-
-def keep_drawn(session: Session, camera_id: str, held: HeldPose) -> None:
-    """Have zones stand as drawn at a new prior pose, where the camera stood when they were drawn.
-
-    That is so of zones since the drift whose pose is accepted, by an estimate of it: each one is a
-    little elsewhere, and the camera was not. And of those from before anybody had agreed to a pose.
-
-    Args:
-        session: of a store.
-        camera_id: of the camera.
-        held: the pose that held until then.
-    """
-    record = zones.of_camera(session, camera_id)
-    if record is None:
-        return
-    since_drift = held.drifted and record.covariance is not None and record.drawn_at >= held.since
-    if held.assumed or since_drift:
-        prior = cameras.prior_pose(session, camera_id)
-        record.prior_pose_id, record.pose, record.covariance = prior.id, asdict(prior.pose), None
 
 
 def zones_document(view: ZonesView, kind: ZoneFormat) -> str:

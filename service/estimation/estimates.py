@@ -1,6 +1,6 @@
 """What comes of a finding, in one transaction: an estimate, its alerts, training and event."""
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -244,10 +244,17 @@ def record_of(
         moved_parameters=dict(drift.move.parameters),
         drift_after=judgement.after,
         drift_since=judgement.since,
-        # A clock that was set back must not make it older than the reference that it was held to.
-        created_at=max(datetime.now(UTC), reference.ready_at or reference.created_at),
+        created_at=_created_at(reference),
         **by,
     )
+
+
+def _created_at(reference: SiteReferenceRecord) -> datetime:
+    """Now, though a clock that was set back may say what is before the reference or its answer."""
+    at = max(datetime.now(UTC), reference.ready_at or reference.created_at)
+    if reference.answered_at is None:
+        return at
+    return max(at, reference.answered_at + timedelta(microseconds=1))
 
 
 def _raw(finding: Finding) -> dict[str, Any]:

@@ -85,6 +85,8 @@ def save_attempt(session: Session, settings: Settings, attempt: Attempt, outcome
         if not replayed:
             _finish(delivery, DeliveryState.DELIVERED, now)
         return
+    if webhook.url != attempt.message.url:
+        return  # another endpoint by now, to which all that waits is sent at once
     delay_s = _delay_s(settings, delivery.tries, outcome)
     _failed(settings, webhook, outcome, delay_s, now)
     if replayed:
@@ -105,10 +107,12 @@ def load_refresh(session: Session, settings: Settings, webhook_id: str) -> Messa
     return all_firing(session, settings, webhook, now)
 
 
-def save_refresh(session: Session, settings: Settings, webhook_id: str, out: Outcome) -> None:
+def save_refresh(
+    session: Session, settings: Settings, webhook_id: str, told: Message, out: Outcome
+) -> None:
     """Write down when an Alertmanager was told; it has no row of its own in the log."""
     webhook = session.get(WebhookRecord, webhook_id)
-    if webhook is None:
+    if webhook is None or webhook.url != told.url:
         return
     now = datetime.now(UTC)
     webhook.refreshed_at = now

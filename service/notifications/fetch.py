@@ -1,7 +1,7 @@
 """One picture asked of a camera: from a checked address, within a deadline and a size."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 import httpcore
@@ -57,6 +57,17 @@ def fetch(settings: Settings, url: str) -> Fetched:
         raise FetchError(f"{type(error).__name__}: {error}") from error
 
 
+class _Digest(httpx.DigestAuth):
+    """Digest; a challenge of a form that httpx does not know is an error of its own kind here."""
+
+    def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
+        """The requests that it takes."""
+        try:
+            yield from super().auth_flow(request)
+        except (KeyError, ValueError, NotImplementedError) as error:
+            raise FetchError(f"it asks for a digest of an unknown form: {error}") from error
+
+
 class _Asked(Exception):
     """An answer that asks for a user and password, in a scheme."""
 
@@ -70,7 +81,7 @@ def _auth(settings: Settings, scheme: str) -> httpx.Auth:
     if user is None or password is None:
         raise FetchError(f"it asks for a user ({scheme}): set SUREFOOT_SNAPSHOT_USER, _PASSWORD")
     if scheme == "digest":
-        return httpx.DigestAuth(user, password)
+        return _Digest(user, password)
     if scheme == "basic":
         return httpx.BasicAuth(user, password)
     raise FetchError(f"it asks for {scheme!r:.40}; basic and digest are known")

@@ -281,7 +281,7 @@ def _seconds(text: str) -> float | None:
         return float(text)
     try:
         at = email.utils.parsedate_to_datetime(text)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return None if at.tzinfo is None else max((at - datetime.now(UTC)).total_seconds(), 0.0)
 

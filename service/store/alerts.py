@@ -245,6 +245,12 @@ def firing_members(session: Session, group_id: str) -> Sequence[AlertRecord]:
     return session.scalars(query.order_by(AlertRecord.camera_id)).all()
 
 
+def outcomes_of(session: Session, group_id: str) -> Sequence[Outcome]:
+    """What came of the alerts that a group is made of, as far as they have ended."""
+    query = select(AlertRecord.outcome).where(AlertRecord.group_id == group_id)
+    return [outcome for outcome in session.scalars(query) if outcome is not None]
+
+
 def groups_without_members(session: Session) -> Sequence[AlertRecord]:
     """Open groups none of whose members is: their cameras are gone."""
     member = aliased(AlertRecord)

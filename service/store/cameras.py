@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any, TypeVar
 
 from sqlalchemy import (
@@ -128,6 +128,7 @@ class PriorPoseRecord(Record):
     __table_args__ = (
         one_of("origin", _ORIGINS),
         Index(None, "camera_id", "id"),
+        {"sqlite_autoincrement": True},  # an id is never given twice
     )
 
     @property
@@ -358,9 +359,15 @@ def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraR
     ).all()
 
 
-def snapshots_due(session: Session, now: datetime, most: int) -> list[tuple[str, str]]:
-    """Cameras of whom a picture is due, and where it is asked for; the longest due first."""
-    due = or_(CameraRecord.snapshot_due_at.is_(None), CameraRecord.snapshot_due_at <= now)
+def snapshots_due(
+    session: Session, now: datetime, every: timedelta, most: int
+) -> list[tuple[str, str]]:
+    """Cameras of whom a picture is due, and where it is asked for; the longest due first.
+
+    One that would be due in more than twice `every` was before a clock was set back.
+    """
+    at = CameraRecord.snapshot_due_at
+    due = or_(at.is_(None), at <= now, at > now + 2 * every)
     rows = session.execute(
         select(CameraRecord.id, CameraRecord.snapshot_url)
         .where(CameraRecord.snapshot_url.is_not(None), due)

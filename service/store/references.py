@@ -77,6 +77,7 @@ class SiteReferenceRecord(Record):
     __table_args__ = (
         one_of("answer", (Answer.PUT_BACK, Answer.MENDED, Answer.FALSE_ALARM)),
         Index(None, "camera_id", "id"),
+        {"sqlite_autoincrement": True},  # an id is never given twice
     )
 
 

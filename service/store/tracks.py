@@ -237,9 +237,12 @@ def counts(session: Session, camera_ids: Collection[str]) -> dict[str, int]:
 
 
 def stored_bytes(session: Session, camera_id: str) -> int:
-    """The bytes of the points, boxes and heads of a camera's tracks."""
-    size = bytes_of_track()
-    return session.scalar(select(func.sum(size)).where(TrackRecord.camera_id == camera_id)) or 0
+    """The bytes of the points, boxes and heads of a camera's tracks.
+
+    Of the source that counts, or of all others together, if these have more: each has a limit.
+    """
+    sizes = select(func.sum(bytes_of_track())).where(TrackRecord.camera_id == camera_id)
+    return max(session.scalars(sizes.group_by(of_counting_source(camera_id))), default=0)
 
 
 def newest_end_s(session: Session, camera_id: str) -> float | None:
@@ -249,9 +252,7 @@ def newest_end_s(session: Session, camera_id: str) -> float | None:
 
 def newest_received_at(session: Session, camera_id: str) -> datetime | None:
     """The time at which a track was stored last."""
-    return session.scalar(
-        select(func.max(TrackRecord.received_at)).where(TrackRecord.camera_id == camera_id)
-    )
+    return session.scalar(select(func.max(TrackRecord.received_at)).where(*counting(camera_id)))
 
 
 def arrivals(

@@ -44,7 +44,7 @@ def run_deliver(context: JobContext, webhook_id: str) -> None:
     if refresh is not None:
         outcome = _send(context, webhook_id, refresh)
         with store.write(about) as session:
-            save_refresh(session, settings, webhook_id, outcome)
+            save_refresh(session, settings, webhook_id, refresh, outcome)
     with store.write(about) as session:
         end_run(session, context.queue, webhook_id)
 

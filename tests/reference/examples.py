@@ -39,6 +39,7 @@ _DAY = datetime(2026, 11, 25, 8, tzinfo=UTC)
 _TIME = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|\+00:00)")
 _SECRET = re.compile(
     r"\bsf_[\w-]+|\bwhsec_[\w+/=-]+|\b[0-9a-f]{12}(?:[0-9a-f]{20}){0,1}(?:[0-9a-f]{32})?\b"
+    r"|\b[0-9a-f]{13}\b"
 )
 _EXACT = re.compile(r"-?\d+\.\d{6,}(?:e[+-]\d+)?")
 _LONGEST_TEXT = 40  # lines

@@ -31,8 +31,9 @@ class SnapshotRounds:
         """Begin to fetch the pictures that are due."""
         if context.settings.snapshots == "off":
             return
+        every = timedelta(minutes=context.settings.snapshot_every_min)
         with context.store.read() as session:
-            due = cameras.snapshots_due(session, datetime.now(UTC), 4 * _AT_ONCE)
+            due = cameras.snapshots_due(session, datetime.now(UTC), every, 4 * _AT_ONCE)
         for camera_id, url in due:
             with self._lock:
                 if camera_id in self._under_way or len(self._under_way) >= 4 * _AT_ONCE:

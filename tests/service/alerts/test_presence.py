@@ -17,6 +17,7 @@ from service.alerts.arrival_models import (
 )
 from service.alerts.data_gaps import data_gap_of, watch_data_gap
 from service.settings import Settings
+from service.store import references
 from service.store.cameras import RhythmRecord
 from service.store.tracks import TrackRecord, pack
 from service.wording.reasons import in_words
@@ -288,3 +289,17 @@ def test_it_is_learned_hourly_in_housekeeping_and_goes_with_its_camera(street):
     street.bench.http.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()
     with street.store.read() as session:
         assert session.get(RhythmRecord, "corner") is None
+
+
+def test_another_source_does_not_hide_that_the_counting_one_is_silent(street):
+    street.people(until_s=MIDNIGHT_S - DAY_S)
+    street.learns()
+    with street.store.write() as session:
+        references.newest(session, "corner").source = "unnamed"
+    beside = {"source": "other", "tracks": [track("1", start_s=time.time() - 60)]}
+    street.bench.http.post("/cameras/corner/tracks", json=beside).raise_for_status()
+    assert street.watch(datetime.now(UTC)) == "no tracks come"
+    beside["tracks"] = [track("2", start_s=time.time() - 30)]
+    street.bench.http.post("/cameras/corner/tracks", json=beside).raise_for_status()
+    assert street.watch(datetime.now(UTC)) is None
+    assert street.bench.alerts()[0]["state"] == "firing"

@@ -343,3 +343,16 @@ def test_who_hears_of_moves_alone_hears_of_a_group_that_speaks_for_them(town):
         with town.store.read() as session:
             told = webhooks.audible(session, [kind], datetime.now(UTC))
         assert [each.kind for each in told] == (["many_moved"] if count else [])
+
+
+def test_what_came_of_it_is_what_came_of_most_members(town):
+    town.build(3)
+    for n in range(3):
+        town.moves(n)
+    for n in (0, 1):
+        town.http.post(f"/cameras/c{n}/pose/put-back").raise_for_status()
+    (last,) = [each for each in town.alerts(state="firing") if each["camera_id"] == "c2"]
+    answer = {"outcome": "false_alarm"}
+    town.http.post(f"/alerts/{last['id']}/resolve", json=answer).raise_for_status()
+    group = next(alert for alert in town.alerts() if alert["camera_id"] is None)
+    assert (group["state"], group["outcome"]) == ("resolved", "put_back")

@@ -9,6 +9,7 @@ from service.cameras import undo
 from service.enums import AlertSource
 from service.reasons import as_said
 from service.store import references
+from tests.conftest import CAMERA
 from tests.service.alerts.test_states import knock, resolve, states, told_history
 from tests.service.bench import PRIOR, moved
 from tests.service.conftest import problem
@@ -114,3 +115,13 @@ def test_not_for_long_and_not_past_what_was_said_or_told_since(bench, monkeypatc
     put_back(bench)
     monkeypatch.setattr(undo, "UNDO_WITHIN", timedelta(0))
     problem(bench.http.post(URL), 409, "conflict")
+
+
+def test_an_answer_about_the_camera_that_had_the_id_before_is_none_of_this_one(bench):
+    put_back(bench)
+    headers = {"If-Match": "*"}
+    bench.http.delete("/cameras/corner", headers=headers).raise_for_status()
+    bench.http.post("/cameras", json=CAMERA).raise_for_status()
+    problem(bench.http.post(URL), 409, "conflict")
+    many = bench.http.post("/acts", json={"act": "undo", "ids": ["corner"]})
+    assert many.status_code == 200

@@ -133,3 +133,19 @@ def test_a_camera_has_its_bytes(settings, monkeypatch):
             session.execute(text("DELETE FROM tracks"))
         monkeypatch.setattr("service.cameras.tracks._RECOUNT_S", 0.0)
         assert client.post(URL, json={"tracks": batch}).status_code == 202
+
+
+def test_zero_bytes_are_any(settings):
+    with client_of(settings, keep_mb=0) as client:
+        assert client.post(URL, json={"tracks": [track("1")]}).status_code == 202
+
+
+def test_two_sources_within_their_limits_are_refused_nothing(settings, monkeypatch):
+    """Each has 16.8 kB of 20: together more than half again of what one may have."""
+    monkeypatch.setattr("service.cameras.tracks._RECOUNT_S", 0.0)
+    with client_of(settings, keep_mb=0.02) as client:
+        for source in ("a", "b"):
+            for n in range(35):
+                body = {"source": source, "tracks": [track(f"{source}{n}")]}
+                assert client.post(URL, json=body).status_code == 202
+        assert client.post(URL, json={"source": "a", "tracks": [track("a35")]}).status_code == 202

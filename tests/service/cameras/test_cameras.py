@@ -8,6 +8,8 @@ from fastapi.testclient import TestClient
 
 from models.geometry.pose import CameraPose
 from service.app import create_app
+from service.store import cameras, references
+from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
 
@@ -174,3 +176,29 @@ def test_a_removed_camera_is_gone_with_its_tracks(http: TestClient):
     assert http.delete("/cameras/corner", headers={"If-Match": etag}).status_code == 204
     problem(http.get("/cameras/corner"), 404, "not_found")
     problem(http.get("/cameras/corner/trainings"), 404, "not_found")
+
+
+def test_a_camera_that_is_registered_anew_is_another_version(http):
+    first = http.post("/cameras", json=CAMERA).headers["ETag"]
+    http.delete("/cameras/corner", headers={"If-Match": first}).raise_for_status()
+    assert http.post("/cameras", json=CAMERA).headers["ETag"] != first
+    stale = http.patch("/cameras/corner", json={"name": "Old"}, headers={"If-Match": first})
+    problem(stale, 412, "precondition_failed")
+
+
+def test_ids_of_poses_and_references_are_given_once(http, settings):
+    """A look that is under way on a deleted camera must not be saved as that of the next one."""
+
+    def ids():
+        with Store(settings).read() as session:
+            prior, reference = (
+                cameras.prior_pose(session, "corner"),
+                references.newest(session, "corner"),
+            )
+            return prior.id, reference.id
+
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    first = ids()
+    http.delete("/cameras/corner", headers={"If-Match": "*"}).raise_for_status()
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    assert all(later > before for later, before in zip(ids(), first, strict=True))

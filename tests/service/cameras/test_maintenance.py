@@ -76,6 +76,8 @@ def test_it_is_ended_early_taken_back_or_moved(corner):
     assert ("maintenance.ended", "Ada") in [(each["what"], each["by"]) for each in entries]
     (left,) = corner.get(URL).json()["items"]
     assert (left["id"], left["state"]) == (window["id"], "over")
+    late = corner.patch(url, json={"from": at(-0.5)})  # after it was ended, before it would have
+    assert problem(late, 422, "malformed")["errors"][0]["pointer"] == "/to"
     planned = begin(corner, from_h=-1, to_h=-2)
     assert corner.delete(f"{URL}/{planned['id']}").status_code == 204
     assert len(corner.get(URL).json()["items"]) == 1

@@ -1,5 +1,6 @@
 """A camera's still image: off unless switched on, made anew, gone with its camera."""
 
+from datetime import UTC, datetime, timedelta
 from io import BytesIO
 
 import pytest
@@ -9,7 +10,8 @@ from PIL import Image
 from service.app import create_app
 from service.formats import confined
 from service.formats.still import read_still
-from service.store.cameras import SnapshotRecord
+from service.store import cameras
+from service.store.cameras import CameraRecord, SnapshotRecord
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
@@ -144,3 +146,19 @@ def test_a_picture_goes_when_it_is_deleted_and_with_its_camera(allowed, settings
     with Store(settings).read() as session:
         assert session.get(SnapshotRecord, "corner") is None
     problem(allowed.put(URL, content=image(), headers=JPEG), 404, "not_found")
+
+
+def test_a_picture_of_the_future_gives_way_and_the_next_is_due(allowed, settings):
+    """They are of before the clock was set back by a month."""
+    ahead, every = timedelta(days=30), timedelta(hours=1)
+    assert allowed.put(URL, content=image(), headers=JPEG).status_code == 200
+    store = Store(settings)
+    with store.write() as session:
+        kept, now = session.get(SnapshotRecord, "corner"), datetime.now(UTC)
+        kept.taken_at, kept.stored_at = kept.taken_at + ahead, kept.stored_at + ahead
+        camera = session.get(CameraRecord, "corner")
+        camera.snapshot_url, camera.snapshot_due_at = "http://10.0.0.1/", now + every
+        assert cameras.snapshots_due(session, now, every, 9) == []
+        camera.snapshot_due_at = now + ahead
+        assert cameras.snapshots_due(session, now, every, 9) == [("corner", "http://10.0.0.1/")]
+    assert allowed.put(URL, content=image(), headers=JPEG).status_code == 200

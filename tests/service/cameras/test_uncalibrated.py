@@ -172,3 +172,36 @@ def test_a_person_helps_with_marks_and_takes_them_back(street):
 def test_what_is_no_mark_is_refused(street, mark):
     problem(street.http.put("/cameras/corner/hints", json=[mark]), 422, "malformed")
     assert street.http.get("/cameras/corner/hints").json()["items"] == []
+
+
+def test_marks_stay_where_the_walking_speed_is_changed_and_go_with_the_pictures_size(street):
+    path = "/cameras/corner/hints"
+    street.http.put(path, json=marks()).raise_for_status()
+
+    def change(**what):
+        street.http.patch(
+            "/cameras/corner", json=what, headers={"If-Match": "*"}
+        ).raise_for_status()
+        return len(street.http.get(path).json()["items"])
+
+    assert change(walking_speed={"mean_mps": 1.3, "sd_mps": 0.1}) == 2
+    lens = CAMERA["intrinsics"]
+    assert change(intrinsics={**lens, "fx": 1000.0, "fy": 1000.0}) == 2
+    half = {name: value / 2 for name, value in lens.items()}
+    assert change(intrinsics=half | {"width": 640, "height": 360}) == 0
+
+
+def test_a_pose_stays_as_sure_as_it_was_agreed_to(street):
+    street.keep_to_lanes(PRIOR, 60)
+    street.look()
+    street.http.post("/cameras/corner/pose/agree").raise_for_status()
+
+    def sure():
+        points = {"points": [[600, 600]]}
+        return street.http.post("/cameras/corner/ground", json=points).json()["points"][0]["sd_m"]
+
+    before = sure()
+    speed = {"walking_speed": {"mean_mps": 1.3, "sd_mps": 0.1}}
+    street.http.patch("/cameras/corner", json=speed, headers={"If-Match": "*"}).raise_for_status()
+    assert before is not None
+    assert sure() == before

@@ -368,3 +368,13 @@ def test_ground_from_pixel_is_what_the_page_draws_by():
 
     assert ground_plan.ground_from_pixel is ground_from_pixel
     assert picture.pixel_from_ground is pixel_from_ground
+
+
+def test_they_stay_as_drawn_at_the_first_prior_pose_that_is_said(http):
+    bare = {name: value for name, value in CAMERA.items() if name != "prior_pose"}
+    http.post("/cameras", json=bare).raise_for_status()
+    draw(http, GATE)
+    said = {"prior_pose": {"height_m": 9.0, "tilt_deg": 35.0}}
+    http.patch("/cameras/corner", json=said, headers={"If-Match": "*"}).raise_for_status()
+    answer = http.get(URL).json()
+    assert (answer["moved"], answer["zones"][0]["points_now"]) == (False, GATE["points"])

@@ -232,7 +232,7 @@ def test_a_camera_is_asked_for_its_picture_and_at_once_in_doubt(http, monkeypatc
 
     def rounds(street):
         with street.context.store.read() as session:
-            due = cameras.snapshots_due(session, datetime.now(UTC), 9)
+            due = cameras.snapshots_due(session, datetime.now(UTC), timedelta(hours=1), 9)
         for camera_id, url in due:
             snapshots.fetch_snapshot(street.context, camera_id, url)
         return len(due)

@@ -1,16 +1,22 @@
 """What comes of attempts: retries, rests, giving up, and the order that is kept."""
 
 import threading
+import time
 from datetime import UTC, datetime, timedelta
 from ipaddress import ip_network
 
+import pytest
+
 from service.alerts.staleness import StaleWatch
-from service.notifications.deliveries import load_attempt, save_attempt
-from service.notifications.send import post
+from service.notifications.deliveries import load_attempt, save_attempt, save_refresh
+from service.notifications.send import Outcome, post
+from service.store import tracks
+from service.store.cameras import CameraRecord
 from service.workers import deliver
 from service.workers.deliver import run_deliver
 from service.workers.upkeep.reconciliation import run_reconcile
 from service.workers.upkeep.retention import run_retention
+from tests.conftest import track
 
 LOOPBACK = (ip_network("127.0.0.0/8"),)
 
@@ -243,3 +249,54 @@ def test_a_run_that_takes_too_long_leaves_the_rest_to_another(post_room, inbox, 
     post_room.send(hook)
     assert len(inbox.received) == 1
     assert post_room.jobs() == [hook["id"]] * 2  # nothing is left, no third one
+
+
+def test_tracks_that_wait_still_are_told_of_once_though_another_worker_watches(post_room):
+    settings = post_room.settings.model_copy(update={"stale_after_s": 0.05})
+    batch = {"tracks": [track("1")]}
+    post_room.http.post("/cameras/corner/tracks", json=batch).raise_for_status()
+
+    def watch(by):
+        with post_room.store.write() as session:
+            return by.watch(session, settings)
+
+    first = StaleWatch()
+    watch(first)
+    time.sleep(0.1)
+    assert watch(first) == {"corner": "opened"}
+    second = StaleWatch()
+    assert watch(second) == {}
+    (alert,) = post_room.http.get("/alerts").json()["items"]
+    assert (alert["kind"], alert["state"]) == ("stale", "firing")
+    with post_room.store.write() as session:  # now they are looked at
+        session.get(CameraRecord, "corner").looked_at_pk = tracks.newest_pk(session, "corner")
+    assert watch(second) == {"corner": "ended"}
+
+
+def test_an_endpoint_that_is_gone_by_then_has_another_url(post_room, inbox):
+    hook = post_room.hook(inbox.url)
+    post_room.open()
+    with post_room.store.read() as session:
+        attempt = load_attempt(session, post_room.settings, hook["id"])
+    other = {"url": inbox.url + "/other"}
+    post_room.http.patch(f"/webhooks/{hook['id']}", json=other).raise_for_status()
+    gone = Outcome(
+        started_at=datetime.now(UTC), duration_s=1.0, status_code=410, error="answered 410"
+    )
+    with post_room.store.write() as session:
+        save_attempt(session, post_room.settings, attempt, gone)
+        save_refresh(session, post_room.settings, hook["id"], attempt.message, gone)
+    shown = post_room.show(hook)
+    assert (shown["enabled"], post_room.log(hook)[0]["state"]) == (True, "pending")
+    post_room.send_now(hook)
+    assert post_room.log(hook)[0]["state"] == "delivered"
+
+
+@pytest.mark.parametrize("late", ["Fri, 31 Dec 2027 23:59:59 +9999999999999999", "9" * 400])
+def test_a_time_to_come_back_that_is_none_is_no_end_of_it(post_room, inbox, late):
+    hook = post_room.hook(inbox.url)
+    inbox.answer((503, {"Retry-After": late}))
+    post_room.open()
+    post_room.send(hook)
+    assert post_room.log(hook)[0]["state"] == "pending"
+    assert len(post_room.log(hook)[0]["attempts"]) == 1

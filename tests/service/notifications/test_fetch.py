@@ -12,6 +12,13 @@ from service.notifications.fetch import FetchError, fetch
 JPEG = b"\xff\xd8\xff a picture"
 
 
+FORMS = (
+    'realm="c", nonce="n", qop="auth-int"',
+    'realm="c", nonce="n", algorithm=SHA-512-256, qop="auth"',
+    'realm="c", nonce="n", stale',
+)
+
+
 class Camera(BaseHTTPRequestHandler):
     """A camera with one picture, for the user `viewer` where it asks for one."""
 
@@ -26,6 +33,8 @@ class Camera(BaseHTTPRequestHandler):
                 "odd": "Negotiate",
             }[kind]
             return self.answer(401, b"", {"WWW-Authenticate": how})
+        if kind.startswith("form"):
+            return self.answer(401, b"", {"WWW-Authenticate": f"Digest {FORMS[int(kind[4:])]}"})
         if kind == "moved":
             return self.answer(302, b"", {"Location": "/picture"})
         return self.answer(200, JPEG * (100_000 if kind == "large" else 1), {})
@@ -113,6 +122,12 @@ def test_a_wrong_password_is_said_and_a_missing_one(camera, known):
             fetch(wrong, camera.url + kind)
     with pytest.raises(FetchError, match="SUREFOOT_SNAPSHOT_USER"):
         fetch(known.model_copy(update={"snapshot_user": None}), camera.url + "basic")
+
+
+@pytest.mark.parametrize("form", range(len(FORMS)))
+def test_a_digest_of_an_unknown_form_is_named(camera, known, form):
+    with pytest.raises(FetchError, match="digest of an unknown form"):
+        fetch(known, f"{camera.url}form{form}")
 
 
 def test_no_answer_is_told(known):

@@ -6,13 +6,15 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy.exc import OperationalError
 
+from service.alerts.arrival_models import HourCounts, load_arrivals, save_arrival_model
 from service.estimate_queue import is_cooling
-from service.store import webhooks
+from service.store import references, webhooks
 from service.store.engines.store import Store
 from service.store.workers import WorkerRecord
 from service.workers.processes.workers import register_worker
 from service.workers.upkeep.periodic import ClockWatch, follow_clock_since_last_run
 from tests.running import free_port
+from tests.service.bench import PRIOR
 
 
 @pytest.mark.parametrize(
@@ -88,3 +90,22 @@ def next_in_s(post_room):
         (delivery,) = webhooks.waiting(session, now)
         (webhook,) = webhooks.every(session)
     return max((at - now).total_seconds() for at in (delivery.next_attempt_at, webhook.held_until))
+
+
+def test_arrivals_are_learned_whatever_the_clock_said(corner, settings):
+    now = datetime.now(UTC)
+    with Store(settings).write() as session:
+        save_arrival_model(
+            session, "corner", None, HourCounts(tracks={}, latest_s={}), now + timedelta(days=30)
+        )
+        assert load_arrivals(session, "corner", now) is not None
+
+
+def test_who_comes_after_an_answer_of_the_future_is_judged(bench):
+    bench.see(PRIOR)
+    bench.http.post("/cameras/corner/pose/put-back").raise_for_status()
+    with bench.store.write() as session:
+        references.newest(session, "corner").answered_at += timedelta(days=30)
+    for _ in range(2):
+        bench.see(PRIOR)
+    assert bench.pose()["state"] == "ok"
