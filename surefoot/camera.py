@@ -82,6 +82,8 @@ def camera_of(body: dict[str, Any]) -> Camera:
     Raises:
         ShapeError: a number is missing, or is none that a camera can have.
     """
+    if not isinstance(body, dict):
+        raise ShapeError(f"an object is needed, got {type(body).__name__}")
     prior = next((body[name] for name in _PRIOR if name in body), None)
     if prior is None:
         raise ShapeError("prior_pose: height_m and tilt_deg are needed, got none")
@@ -90,7 +92,7 @@ def camera_of(body: dict[str, Any]) -> Camera:
     try:
         lens = lens_of(**body["lens"]) if "lens" in body else Intrinsics(**body["intrinsics"])
         camera = Camera(intrinsics=lens, prior_pose=Pose(**prior))
-    except (KeyError, TypeError) as error:
+        _ = camera.prior_pose.in_radians  # refuses what no camera can have
+    except (KeyError, TypeError, AttributeError, ZeroDivisionError) as error:
         raise ShapeError(f"intrinsics or lens, prior_pose: {error}") from error
-    _ = camera.prior_pose.in_radians  # refuses what no camera can have
     return camera

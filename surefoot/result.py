@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from models.durations import DAY_S
+from models.errors import TooFewTrajectoriesError
 from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.verdict import Drift, DriftLimits, judge
@@ -16,6 +17,7 @@ from models.pose import (
     observe,
     since_alarm,
 )
+from models.walking.config import FEWEST_WALKERS
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
@@ -59,6 +61,8 @@ class Result:
         if name == "height":
             return prior.height_m * math.exp(low), prior.height_m * math.exp(high)
         at = math.degrees(getattr(prior, f"{name}_rad"))
+        if name == "heading":  # as the pose, which is within one turn, says it
+            at += 360 * round((self.pose.heading_deg - at) / 360)
         return at + math.degrees(low), at + math.degrees(high)
 
 
@@ -81,6 +85,10 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     """
     model, ordered = site.model, in_order(tracks)
     observed = observe(ordered, model.intrinsics, model.prior)
+    if observed.walkers < FEWEST_WALKERS:
+        raise TooFewTrajectoriesError(
+            f"tracks: at least {FEWEST_WALKERS} people who walk are needed, got {observed.walkers}"
+        )
     found = estimate_pose(observed, model)
     chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
     found = since_alarm(found, observed, model, chart)

@@ -64,13 +64,14 @@ def read_site(path: str | Path) -> Site:
         with zipfile.ZipFile(path) as file:
             camera = camera_of(json.loads(file.read(_CAMERA)))
             parts = {name: file.read(name) for name in file.namelist()}
+            walking = reference_from_bytes(parts[_WALKING])
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise CheckpointError(f"{path}: no site of ours: {error}") from error
     paths, chart = parts.get(_PATHS), parts.get(_CHART)
     model = CameraSite(
         intrinsics=camera.intrinsics,
         prior=camera.prior_pose.in_radians,
-        speed_reference=reference_from_bytes(parts[_WALKING]),
+        speed_reference=walking,
         paths=None if paths is None else paths_from_bytes(paths),
         chart=None if chart is None else chart_from_bytes(chart),
     )

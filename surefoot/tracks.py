@@ -36,14 +36,14 @@ def read_tracks(
         ShapeError: the file is missing, is in neither form, or has no frame rate.
     """
     try:
-        with Path(path).open(newline="") as file:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
             first = file.readline()
             file.seek(0)
             has_names = set(_FOOT) <= set(first.strip().split(","))
             if not has_names and frame_rate_hz is None:
                 raise ShapeError(f"{path}: frame_rate_hz is needed of MOTChallenge text")
             rows = list(_named(file) if has_names else _mot(file, frame_rate_hz or 1, started_at_s))
-    except (OSError, ValueError, IndexError) as error:
+    except (OSError, TypeError, ValueError, IndexError) as error:
         raise ShapeError(f"{path}: neither MOTChallenge text nor CSV of feet: {error}") from error
     points: dict[str, dict[float, tuple[float, float, float]]] = defaultdict(dict)
     for name, time_s, *point in rows:
@@ -71,7 +71,8 @@ def _mot(lines: Iterator[str], frame_rate_hz: float, started_at_s: float) -> Ite
         cells = line.split(",")
         frame, _, left, top, width, height = map(float, cells[:_MOT_CELLS])
         time_s = started_at_s + (frame - 1) / frame_rate_hz
-        yield cells[1].strip(), time_s, left - 1 + width / 2, top - 1 + height, top - 1
+        top_v = top - 1 if top - 1 > 1 else np.nan  # cut by the border, as of `tops_of_boxes`
+        yield cells[1].strip(), time_s, left - 1 + width / 2, top - 1 + height, top_v
 
 
 def _track(points: dict[float, tuple[float, float, float]]) -> Track:

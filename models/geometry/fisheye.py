@@ -15,6 +15,7 @@ from models.geometry.rotation import Array, Mask
 # Rays have z = 1: at a right angle to the axis there is none, and here one is 29 long.
 MOST_ANGLE_RAD = math.radians(88.0)
 _NEWTON_STEPS = 30
+_TABLE = 512  # places
 _CONVERGED = 1e-12
 _TINY = 1e-9
 _WITHIN = 0.999  # of the radius that is reached, where a border is to be seen
@@ -81,10 +82,12 @@ class Fisheye(NamedTuple):
         """Rays (..., 2), z = 1, of image points (..., 2), and which are valid (...).
 
         Newton's method on the angle, which is held within the lens: there the image radius grows.
+        It begins near the angle, by a table: of a lens that almost folds it would not come there.
         """
         wanted = np.hypot(image[..., 0], image[..., 1])
         limit = self.max_angle_rad
-        angle = np.minimum(wanted, limit)
+        table = np.linspace(0.0, limit, _TABLE)
+        angle = np.interp(wanted, self._image_radius(table), table)
         for _ in range(_NEWTON_STEPS):
             miss = self._image_radius(angle) - wanted
             if np.nanmax(np.abs(miss), initial=0.0) < _CONVERGED:

@@ -117,6 +117,13 @@ PARAMETERS = ("tilt", "roll", "height", "heading")
 FIELDS = {"tilt": "tilt_rad", "roll": "roll_rad", "height": "height_m", "heading": "heading_rad"}
 
 
+def parameters_apart(one: Array, other: Array) -> Array:
+    """Tilt, roll, log height, heading (4,) less another's; roll and heading within half a turn."""
+    apart = one - other
+    apart[[1, 3]] = [math.remainder(angle, 2 * math.pi) for angle in apart[[1, 3]].tolist()]
+    return np.asarray(apart)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseParameters:
     """Height, tilt, roll and heading of a pose, their standard deviations, or how far they moved.

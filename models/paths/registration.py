@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from models.geometry.pose import parameters_apart
 from models.geometry.rotation import Array, Mask
 from models.paths import config
 from models.paths.ground_steps import place_steps
@@ -45,9 +46,7 @@ class Belief:
         return -precision @ apart, precision
 
     def _apart(self, candidate: Array) -> Array:
-        apart = candidate - self.mean
-        apart[3] = math.remainder(float(apart[3]), 2 * math.pi)
-        return np.asarray(apart)
+        return parameters_apart(candidate, self.mean)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +137,7 @@ def distinct(peaks: Sequence[Peak]) -> list[Peak]:
     """Peaks that are not about the same, the highest first."""
     kept: list[Peak] = []
     for peak in sorted(peaks, key=lambda peak: -peak.value):
-        apart = [np.abs(peak.candidate - other.candidate).max() for other in kept]
+        apart = [np.abs(parameters_apart(peak.candidate, o.candidate)).max() for o in kept]
         if min(apart, default=np.inf) > config.SAME_PEAK_RAD:
             kept.append(peak)
     return kept

@@ -13,6 +13,7 @@ from models.geometry.pose import (
     PLANE_PARAMETERS,
     CameraPose,
     identifiable_of,
+    parameters_apart,
     plane_parameters_of,
 )
 from models.geometry.rotation import Array, Index
@@ -183,7 +184,7 @@ def moved_beyond_doubt(
     posed = set(PLANE_PARAMETERS) <= set(before.identifiable)
     if groups < config.GROUPS_OF_A_COVARIANCE or not posed:
         return False
-    offset = after.values - before.values
+    offset = parameters_apart(after.values, before.values)
     chance = before.covariance + after.covariance
     habits = chance + 2 * np.diag(config.HABITS)
     farthest = PARAMETERS[int(np.argmax(offset**2 / np.diag(habits)))]
@@ -212,7 +213,7 @@ def widened(
     the way between the two poses over the number of groups. And no parameter is surer than so many
     people can make it: few of them, who walk alike, may seem to agree.
     """
-    offset = (after.values - before.values) / max(walking_groups, 1)
+    offset = parameters_apart(after.values, before.values) / max(walking_groups, 1)
     floor = least_covariance(walking_groups, speed_reference, paths)
     covariance = _at_least(after.covariance + np.outer(offset, offset), floor)
     determined = identifiable_of(PARAMETERS, np.sqrt(np.diag(covariance)))

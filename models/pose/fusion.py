@@ -15,6 +15,7 @@ from models.paths.path_tests import group_fits, loss
 from models.paths.reference import PathReference
 from models.paths.registration import (
     Posterior,
+    distinct,
     on_seen_ground,
     refined,
     shape_at,
@@ -74,7 +75,7 @@ def fused_estimate(
     fitting = _fitting(find_modes(posterior, tracks, site, joint, warm_start), paths)
     if warm_start is None and (not fitting or paths.fit.is_doubtful(fitting[0][1])):
         far = find_modes(posterior, tracks, site, joint, headings=config.FAR_HEADINGS)
-        fitting = sorted(fitting + _fitting(far, paths), key=lambda each: -each[0].peak.value)
+        fitting = _distinct(fitting + _fitting(far, paths))
     changed = partial(_changed_paths, posterior, paths, joint, prior)
     if not fitting:
         return by_speeds_alone(joint, prior, changed())
@@ -103,6 +104,12 @@ def _fitting(modes: list[Mode], paths: PathReference) -> list[tuple[Mode, Array]
         if fits.size >= config.ON_MAP * walkers.walking_groups and not paths.fit.has_changed(fits):
             found.append((mode, fits))
     return found
+
+
+def _distinct(modes: list[tuple[Mode, Array]]) -> list[tuple[Mode, Array]]:
+    """The modes that are not about the same, the highest first: both searches may find one."""
+    peaks = distinct([mode.peak for mode, _ in modes])
+    return [next(each for each in modes if each[0].peak is peak) for peak in peaks]
 
 
 def _changed_paths(

@@ -17,7 +17,14 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaln, log_ndtr, logsumexp
 
-from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters, array_of
+from models.geometry.pose import (
+    ANGLES,
+    PARAMETERS,
+    CameraPose,
+    PoseParameters,
+    array_of,
+    parameters_apart,
+)
 from models.geometry.rotation import Array, Mask
 from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
 from models.pose import config
@@ -154,15 +161,15 @@ def pose_posterior(
     before any track.
     """
     seen = seen_parameters(fused, walking_groups)
-    offset = fused.values - array_of(prior)
-    offset[[1, 3]] = [math.remainder(float(offset[at]), 2 * math.pi) for at in (1, 3)]
+    offset = parameters_apart(fused.values, array_of(prior))
     noise = fused.covariance[np.ix_(seen, seen)]
     degrees = degrees_of_freedom(walking_groups)
     moves = move_covariances()
     marginals = noise + moves[:, seen][:, :, seen]
     gains = np.linalg.solve(marginals, moves[:, seen]).transpose(0, 2, 1)
     squared = np.einsum("i,kij,j->k", offset[seen], np.linalg.inv(marginals), offset[seen])
-    squared[0] = _at_prior(float(squared[0]), fused.prior_gap, walking_groups)
+    if seen.any():
+        squared[0] = _at_prior(float(squared[0]), fused.prior_gap, walking_groups)
     log_weights = log_prior(moved_prior) + log_student(squared, marginals, degrees)
     means = gains @ offset[seen]
     # The variance of a t: of few groups it is wider than that of a normal distribution.

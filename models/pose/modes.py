@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.geometry.pose import CameraPose
+from models.geometry.pose import CameraPose, parameters_apart
 from models.geometry.rotation import Array
 from models.paths.path_tests import loss
 from models.paths.registration import Belief, Peak, Posterior, distinct, register
@@ -153,7 +153,7 @@ def birge_ratio(belief: Belief, precision: Array, values: Array) -> float:
 
 def covariance_between(peaks: list[Peak], odds: Array) -> Array:
     """The covariance (4, 4) around the first of some modes by the others, with odds (P,)."""
-    away = np.array([peak.candidate - peaks[0].candidate for peak in peaks])
+    away = np.array([parameters_apart(peak.candidate, peaks[0].candidate) for peak in peaks])
     return np.asarray((away * (odds / odds.sum())[:, None]).T @ away)
 
 

@@ -171,8 +171,11 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     if anchor is not None and anchor.record.creep is not None:
         log = creep_log_from_bytes(anchor.record.creep)
         stood = without_creep(trajectories, period.intrinsics, period.prior, log, anchor.from_s)
-        trajectories = tuple(track for track in stood if track is not None)
-        weights = weights[[track is not None for track in stood]]
+        # Some have lost their ends by that: another order.
+        ends = {n: track.time_s[-1] for n, track in enumerate(stood) if track is not None}
+        order = sorted(ends, key=ends.__getitem__)
+        trajectories = tuple(track for n in order if (track := stood[n]) is not None)
+        weights = weights[order]
     known = None if period.kept is None or period.spoilt else period.kept.data
     grown = learn_site(
         observe(trajectories, period.intrinsics, period.prior),

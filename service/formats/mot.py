@@ -145,7 +145,7 @@ def _read_lines(body: bytes) -> _Lines:
             "post a part of the time at once"
         )
     lines = _Lines()
-    text = TextIOWrapper(BytesIO(body), encoding="utf-8", errors="replace")
+    text = TextIOWrapper(BytesIO(body), encoding="utf-8-sig", errors="replace")
     first_no = 1
     while block := list(islice(text, _BLOCK)):
         check_effort()

@@ -31,6 +31,8 @@ class _Open(msgspec.Struct, array_like=True):
     size: tuple[float, float] | None
     heard_s: float  # by the clock of who assembles
     rows: Any  # array of floats; bytes where saved
+    first_s: float = math.inf  # messages come out of turn
+    last_s: float = -math.inf
 
 
 class _State(msgspec.Struct, array_like=True):
@@ -52,6 +54,7 @@ class Assembler:
     max_tracks: int = 20_000
     max_points: int = 1_000_000
     max_track_points: int = 10_000  # what the service takes
+    max_track_s: float = 3_600.0
     _open: dict[tuple[str, str], _Open] = field(default_factory=dict)  # longest unheard first
     _finished: list[WholeTrack] = field(default_factory=list)
     # First and last time of what was finished last: brokers send again what was not acknowledged.
@@ -115,6 +118,7 @@ class Assembler:
             opened = {(each.camera, each.track_id): each for each in found.open}
             for each in found.open:
                 each.rows = _rows(each.rows, _COLUMNS)
+                each.first_s, each.last_s = min(each.rows[::_COLUMNS]), max(each.rows[::_COLUMNS])
         except (msgspec.MsgspecError, ValueError, TypeError) as error:
             raise StateError(f"no saved state of an assembler: {error}") from error
         self._open, self._finished = opened, []
@@ -137,16 +141,19 @@ class Assembler:
         self._open[key] = track
         track.heard_s = now_s
         track.rows.extend((found.time_s, *found.box))
+        track.first_s = min(track.first_s, found.time_s)
+        track.last_s = max(track.last_s, found.time_s)
         self._open_points += 1
         while len(self._open) > self.max_tracks or self._open_points > self.max_points:
             self._finish(next(iter(self._open)))
 
     def _is_another(self, track: _Open, found: Detection) -> bool:
         """True where a known id is of somebody else, or seen in another picture, by now."""
-        first_s, last_s = track.rows[0], track.rows[-_COLUMNS]
+        first_s, last_s = min(track.first_s, found.time_s), max(track.last_s, found.time_s)
         # Within it is what was sent again, however long ago that was.
         return (
-            not first_s - self.silence_s <= found.time_s <= last_s + self.silence_s
+            max(track.first_s - first_s, last_s - track.last_s) > self.silence_s
+            or last_s - first_s > self.max_track_s
             or found.size != track.size
             or len(track.rows) >= self.max_track_points * _COLUMNS
         )

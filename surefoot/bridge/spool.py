@@ -157,8 +157,8 @@ class Spool:
             else:
                 alike = self._db.execute(
                     "SELECT number, track FROM posts WHERE camera = ? AND head = ? "
-                    "ORDER BY number LIMIT ?",
-                    (camera, head, MAX_GROUP_TRACKS),
+                    "AND number >= ? ORDER BY number LIMIT ?",
+                    (camera, head, number, MAX_GROUP_TRACKS),
                 )
                 left_out |= by_itself
             group = Group(camera, head)

@@ -177,3 +177,9 @@ def test_a_heading_that_surely_moved_is_not_told_where_nobody_can_tell_how_far()
     found = drift(estimate(heading=30, sd=wide, identifiable=three))
     assert found.identifiable == three
     assert found.move.parameters["heading"] > 0.99  # the verdict says so
+
+
+def test_who_are_too_few_to_say_anything_say_nothing_of_the_prior_pose_either():
+    few = pose_posterior(estimate(3.0, prior_gap=60.0), 4, PRIOR)
+    assert not few.seen.any()
+    assert few.moved == pytest.approx(config.MOVED_PRIOR)

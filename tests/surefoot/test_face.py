@@ -4,6 +4,8 @@ import json
 import math
 import subprocess
 import sys
+import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -194,3 +196,63 @@ def test_a_drift_counts_from_where_the_service_counts_it():
     assert ours["drift_floor_m"].default == limits.floor_m
     assert ours["drift_people"].default == limits.people
     assert ours["drift_clear_ratio"].default == limits.clear_ratio
+
+
+def test_too_few_people_make_no_estimate(site, people):
+    for few in ([], people[1][:4]):
+        with pytest.raises(surefoot.CalibrationError, match=f"5 people.*got {len(few)}"):
+            surefoot.estimate(site, few)
+
+
+def test_a_heading_is_in_its_interval_whatever_the_turn(site, people):
+    result = surefoot.estimate(site, people[1])
+    prior = replace(result.posterior.prior, heading_rad=math.radians(359.0))
+    posterior = replace(result.posterior, prior=prior)
+    pose = replace(result.pose, heading_deg=359.0 + math.degrees(posterior.offset[3]) - 360.0)
+    turned = replace(result, pose=pose, posterior=posterior, estimated=("heading_deg",))
+    low, high = turned.intervals(0.9)["heading_deg"]
+    assert low <= pose.heading_deg <= high
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        5,
+        [1],
+        {"prior_pose": {"height_m": "6", "tilt_deg": 18}},
+        {"prior_pose": {"height_m": None, "tilt_deg": 18}},
+        {"prior_pose": [6, 18]},
+        {"lens": {"width": 1280, "height": 720, "hfov_deg": 0}},
+        {"lens": {"width": 0, "height": 720, "focal_mm": 4, "sensor_mm": [5, 3]}},
+        {"lens": {"width": 1280, "height": 720, "fisheye": 5}},
+    ],
+)
+def test_what_is_no_camera_is_said_by_an_error_of_ours(tmp_path, wrong):
+    lens = {"width": 1280, "height": 720, "fx": 900, "fy": 900, "cx": 639.5, "cy": 359.5}
+    body = {"prior_pose": {"height_m": 5, "tilt_deg": 45}, "intrinsics": lens}
+    if isinstance(wrong, dict):
+        kept = {} if "lens" in wrong else {"intrinsics": lens}
+        wrong = {"prior_pose": body["prior_pose"], **kept, **wrong}
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(wrong))
+    with pytest.raises(surefoot.CalibrationError, match="camera.json|prior_pose"):
+        surefoot.read_camera(path)
+
+
+def test_tracks_and_sites_that_are_none_are_said_by_errors_of_ours(camera, tmp_path):
+    feet = tmp_path / "feet.csv"
+    feet.write_text("track_id,time_s,u_px,v_px\na,0.0,100,200\na,0.5,108\n")
+    with pytest.raises(surefoot.CalibrationError, match="neither MOTChallenge text nor CSV"):
+        surefoot.read_tracks(feet)
+    with zipfile.ZipFile(tmp_path / "bare.site", "w") as file:
+        file.writestr("camera.json", camera.as_json())
+    with pytest.raises(surefoot.CalibrationError, match="bare.site: no site of ours"):
+        surefoot.read_site(tmp_path / "bare.site")
+
+
+def test_a_box_that_the_border_cuts_has_no_top_and_a_mark_of_bytes_no_meaning(tmp_path):
+    mot = tmp_path / "mot.txt"
+    rows = [f"{1 + 10 * n},7,100,{3 - n if n < 3 else 9},21,{80 + n},1" for n in range(6)]
+    mot.write_text("\ufeff" + "\n".join(rows), encoding="utf-8")
+    (track,) = surefoot.read_tracks(mot, frame_rate_hz=25)
+    np.testing.assert_array_equal(track.top_v, [2, np.nan, np.nan, 8, 8, 8])

@@ -86,6 +86,21 @@ def test_the_lens_ends_at_88_degrees_or_where_it_folds(lens: Intrinsics) -> None
     assert_allclose(lens.pulled_in(line[:100]), line[:100])
 
 
+@pytest.mark.parametrize(
+    "distortion", [(0.171, -0.272, 0.258, -0.081), (0.372, -0.130, 0.566, -0.275)]
+)
+def test_a_lens_that_almost_folds_is_known_as_far_as_it_reaches(
+    distortion: tuple[float, ...],
+) -> None:
+    """Newton's method from the radius itself did not come to 7 and to 49 % of its pixels."""
+    lens = replace(EQUIDISTANT, fx=400, fy=400, distortion=distortion)
+    angles = np.linspace(0.0, 0.999 * math.atan(lens.max_radius), 500)
+    image = angles * (1 + sum(k * angles ** (2 * n) for n, k in enumerate(distortion, start=1)))
+    rays, valid = lens.rays(np.column_stack([630 + 400 * image, np.full(500, 470.0)]))
+    assert valid.all()
+    assert_allclose(np.arctan2(rays[:, 0], rays[:, 2]), angles, atol=1e-6)
+
+
 def test_what_is_behind_or_no_number_is_not_valid() -> None:
     _, valid = LENS.project(np.array([[0.1, 0.1, -1.0], [0.1, 0.1, 0.0], [0.0, 0.0, 1.0]]))
     assert valid.tolist() == [False, False, True]

@@ -4,13 +4,18 @@ The window that it is to judge stays out of it.
 """
 
 import time
+from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from sqlalchemy import delete, select
 
 from models.paths.reference import paths_from_bytes
+from models.pose import learn_site
+from models.tracks.trajectory import by_end
+from service.estimation import growth
 from service.estimation.anchoring import LearnedPaths
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
@@ -302,3 +307,37 @@ def test_a_map_with_tracks_of_a_move_in_it_is_learned_without_them(known):
     known.keep_to_lanes(PRIOR, 1)
     known.look()
     assert map_of(known).learned_at == again.learned_at
+
+
+def test_a_map_grows_of_a_crowd_that_loses_ends_to_a_creep(known, monkeypatch):
+    """What a camera that had not crept would not have shown is cut off: another order of ends."""
+    known.keep_to_lanes(PRIOR, 49 + WINDOW)
+    known.look()
+    known.keep_to_lanes(PRIOR, 1)
+    period = due(known)
+    begin_s = period.trajectories[0].time_s[0]
+    crowd = by_end(
+        replace(track, time_s=track.time_s - track.time_s[0] + begin_s + n)
+        for n, track in enumerate(period.trajectories)
+    )
+    cut = [_first(track, len(track.time_s) - 2 * (n % 3)) for n, track in enumerate(crowd)]
+    assert [track.time_s[-1] for track in cut] != sorted(track.time_s[-1] for track in cut)
+    taken = {}
+
+    def learn(observations, *args, weights, **how):
+        taken["weights"] = weights
+        return learn_site(observations, *args, weights=weights, **how)
+
+    monkeypatch.setattr(growth, "creep_log_from_bytes", lambda _: None)
+    monkeypatch.setattr(growth, "without_creep", lambda *_: [None, *cut[1:]])
+    monkeypatch.setattr(growth, "learn_site", learn)
+    anchor = SimpleNamespace(record=SimpleNamespace(creep=b""), from_s=None)
+    weights = np.linspace(0.5, 1.0, len(cut))
+    busy = replace(period, anchor=anchor, trajectories=tuple(crowd), weights=weights)
+    assert compute_growth(busy, seed=0) is not None
+    order = sorted(range(1, len(cut)), key=lambda n: cut[n].time_s[-1])
+    assert taken["weights"].tolist() == weights[order].tolist()
+
+
+def _first(track, points):
+    return replace(track, time_s=track.time_s[:points], uv=track.uv[:points])

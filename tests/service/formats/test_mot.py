@@ -231,3 +231,10 @@ def test_ids_are_bounded_whatever_they_are_of(corner):
     lines = (f"1,{n},1,1,9,9,1,5" for n in range(20_001))  # a car each
     document = problem(send(corner, lines), 413, "too_large")
     assert document["detail"].startswith("ids: at most 20000 of all classes")
+
+
+def test_a_mark_of_the_order_of_bytes_costs_no_line(corner, settings):
+    first, *others = walk("7")
+    send(corner, ["\ufeff" + first, *others], frame_rate_hz=25).raise_for_status()
+    (record,) = stored(settings)
+    assert len(unpack(record.points, 3)) == 6

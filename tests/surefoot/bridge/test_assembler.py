@@ -162,3 +162,26 @@ def test_whatever_happens_each_detection_comes_out_once_and_the_bounds_hold(
     post()
     assert len(out) == len(set(out))
     assert set(out) == added
+
+
+def test_a_late_message_cuts_no_walk():
+    assembler = Assembler(silence_s=5)
+    walk(assembler, count=40)
+    assembler.add(seen(at=1.25), T0 + 20)  # on its way for longer than a silence
+    saved = assembler.state()
+    for each in (assembler, Assembler(silence_s=5)):
+        each.restore(saved)
+        walk(each, count=10, start=20)
+        each.finish_all()
+        (track,) = each.take()
+        assert len(track.rows) // 5 == 51
+
+
+def test_who_stays_for_hours_is_some_tracks_that_the_service_takes():
+    assembler = Assembler()
+    for second in range(7_500):
+        assembler.add(seen(at=float(second)), T0 + second)
+    assembler.finish_all()
+    tracks = assembler.take()
+    assert sum(len(track.rows) // 5 for track in tracks) == 7_500
+    assert [track.rows[-5] - track.rows[0] for track in tracks] == [3_600, 3_600, 297]

@@ -53,3 +53,17 @@ def test_a_message_that_is_refused_in_each_frame_is_told_once(tmp_path, caplog):
     told = [each.topic for each in caplog.records if each.message == "mqtt_message_refused"]
     assert sorted(told) == ["surefoot/cam0/frames", "surefoot/cam1/frames"]
     spool.close()
+
+
+def test_no_post_is_empty_where_the_oldest_rest(tmp_path):
+    spool = Spool(tmp_path / "spool", 10**8)
+    spool.keep(0.0, None, [Part("yard", b'{"source":"a"}', b"%d" % n) for n in range(450)])
+    first = spool.next((), ())
+    assert len(first.tracks) == 200
+    held = list(first.tracks)
+    second = spool.next(held, held)  # the service failed on the first: all of it rests
+    assert [len(second.tracks), min(second.tracks)] == [200, max(held) + 1]
+    spool.drop(second)
+    assert len(spool.next(held, held).tracks) == 50
+    spool.drop(spool.next(held, held))
+    assert spool.next(held, held) is None
