@@ -10,7 +10,7 @@ from models.durations import HOUR_S
 from models.reasons import Reason, Value
 from service.enums import DeliveryState, WebhookFormat
 from service.job_queue import JobQueue
-from service.notifications.messages import Message, all_firing, message_of
+from service.notifications.messages import Message, all_firing, message_of, url_of
 from service.notifications.outbox import wake
 from service.notifications.send import Outcome
 from service.reasons import ServiceCode
@@ -85,7 +85,7 @@ def save_attempt(session: Session, settings: Settings, attempt: Attempt, outcome
         if not replayed:
             _finish(delivery, DeliveryState.DELIVERED, now)
         return
-    if webhook.url != attempt.message.url:
+    if url_of(webhook) != attempt.message.url:
         return  # another endpoint by now, to which all that waits is sent at once
     delay_s = _delay_s(settings, delivery.tries, outcome)
     _failed(settings, webhook, outcome, delay_s, now)
@@ -112,7 +112,7 @@ def save_refresh(
 ) -> None:
     """Write down when an Alertmanager was told; it has no row of its own in the log."""
     webhook = session.get(WebhookRecord, webhook_id)
-    if webhook is None or webhook.url != told.url:
+    if webhook is None or url_of(webhook) != told.url:
         return
     now = datetime.now(UTC)
     webhook.refreshed_at = now

@@ -38,6 +38,13 @@ class Message:
     headers: dict[str, str] = field(default_factory=dict)
 
 
+def url_of(webhook: WebhookRecord) -> str:
+    """Where its messages go."""
+    if webhook.format == WebhookFormat.ALERTMANAGER:
+        return f"{webhook.url.rstrip('/')}/api/v2/alerts"
+    return webhook.url
+
+
 def message_of(
     session: Session,
     settings: Settings,
@@ -53,7 +60,7 @@ def message_of(
     if webhook.old_secret and webhook.old_secret_until and webhook.old_secret_until > now:
         secrets.append(secret_of(settings, webhook, old=True) or "")
     return Message(
-        url=webhook.url, body=body, headers=_signed_headers(delivery.id, now, body, secrets)
+        url=url_of(webhook), body=body, headers=_signed_headers(delivery.id, now, body, secrets)
     )
 
 
@@ -88,7 +95,7 @@ def _stands(
 
 
 def _to_alertmanager(webhook: WebhookRecord, posted: list[dict[str, Any]]) -> Message:
-    return Message(url=f"{webhook.url.rstrip('/')}/api/v2/alerts", body=_json(posted))
+    return Message(url=url_of(webhook), body=_json(posted))
 
 
 def _signed_headers(
