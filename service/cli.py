@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from service.commands.asking import LOCAL_URL, Url
 from service.commands.data import DATA_COMMANDS, DataDir
@@ -91,7 +92,7 @@ def worker(
     try:
         run_worker(settings, name, follow_stdin, only)
     except WorkerRunningError as error:
-        Console(stderr=True).print(f"[red]worker refused:[/] {error}")
+        Console(stderr=True).print(f"[red]worker refused:[/] {escape(str(error))}")
         raise typer.Exit(exits.REFUSED) from error
 
 
@@ -121,7 +122,7 @@ def replay(
     console = Console()
     try:
         with Progress(console=console) as bar:
-            task = bar.add_task(f"posting {scene_dir.name}", total=None)
+            task = bar.add_task(f"posting {escape(scene_dir.name)}", total=None)
             scene, done = replay_scene(
                 scene_dir,
                 url,
@@ -131,9 +132,9 @@ def replay(
                 token=token,
             )
     except (CalibrationError, httpx.HTTPError) as error:
-        console.print(f"[red]replay failed:[/] {error}")
+        console.print(f"[red]replay failed:[/] {escape(str(error))}")
         raise typer.Exit(1) from error
-    console.print(
+    typer.echo(
         f"{done.accepted} tracks accepted, {done.duplicates} known already, {done.rejected} "
         f"rejected: {url}/cameras/{scene.scene_id}/pose"
     )

@@ -6,6 +6,7 @@ import fcntl
 import logging
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
@@ -160,12 +161,11 @@ def _ours_in(folder: Path) -> set[Path]:
 
 def _narrow(path: Path) -> None:
     """Take group's and others' rights off; what is not wider is left alone, and so are links."""
-    if path.is_symlink():
-        return
-    mode = path.stat().st_mode & 0o7777
-    if mode & 0o077:
-        path.chmod(mode & 0o700)
-        log.info("made_private", extra={"path": str(path), "was": oct(mode)})
+    with contextlib.suppress(FileNotFoundError):  # a service that runs deletes files meanwhile
+        mode = path.stat(follow_symlinks=False).st_mode
+        if mode & 0o077 and not stat.S_ISLNK(mode):
+            path.chmod(mode & 0o700)
+            log.info("made_private", extra={"path": str(path), "was": oct(mode & 0o7777)})
 
 
 def _read_pid(lock: TextIO) -> str:

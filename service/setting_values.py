@@ -10,11 +10,15 @@ from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import AfterValidator, ValidationError
 
+from models.durations import DAY_S, HOUR_S
+
 _SECRETS = ("secret_key", "proxy_secret", "database_url", "mqtt_password", "smtp_password")
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 
 WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 _ADDRESS = re.compile(r"[!-?A-~]+@[!-?A-~]+")  # of printable ASCII; what takes it knows the rest
+_UNITS_S = {"days": DAY_S, "hours": HOUR_S, "h": HOUR_S, "min": 60.0, "s": 1.0}
+_LONGEST_S, _LARGEST = 36_500 * DAY_S, 2**31 - 1
 _USER = re.compile(r"(?<=//)[^/@\s]*@")  # of a URL, with the password
 _MOST_WORKERS = 4  # unless more are asked for: each holds 240 MB
 
@@ -45,6 +49,18 @@ def readable(read: Callable[[str], object]) -> AfterValidator:
         return text
 
     return AfterValidator(check)
+
+
+def check_number(name: str, value: float) -> None:
+    """Check that a number is one that times and rows can be counted by; `name` ends with its unit.
+
+    Raises:
+        ValueError: it is infinite, or more than a century or 2147483647.
+    """
+    unit_s = _UNITS_S.get(name.rpartition("_")[2])
+    most = _LARGEST if unit_s is None else _LONGEST_S / unit_s
+    if not abs(value) <= most:  # nor is it NaN
+        raise ValueError(f"at most {most:.10g} is taken, got {value!r:.40}")
 
 
 def read_key(text: str) -> bytes:
@@ -94,6 +110,15 @@ def read_http_url(text: str) -> str:
     return text
 
 
+def read_public_url(text: str) -> str:
+    """The URL of this service; empty is none.
+
+    Raises:
+        ValueError: it is none, or has a user, a query or a fragment.
+    """
+    return text and read_http_url(text)
+
+
 def read_camera_names(text: str) -> dict[str, str]:
     """Ids of cameras by the names that others have for them: `name=id`, with commas.
 
@@ -133,7 +158,7 @@ def read_delays(text: str) -> tuple[float, ...]:
         ValueError: one of them is none, or not above 0.
     """
     delays = tuple(float(part) for part in text.split(","))
-    if not all(delay > 0 for delay in delays):
+    if not all(0 < delay <= _LONGEST_S for delay in delays):
         raise ValueError(f"numbers above 0, with commas, are needed, got {text!r}")
     return delays
 

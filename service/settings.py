@@ -214,7 +214,9 @@ class Settings(BaseSettings):
     )
     smtp_user: str | None = Field(None, description="user at the mail server")
     smtp_password: str | None = Field(None, repr=False, description="and the password")
-    public_url: str | None = Field(None, description="where people reach this service, for links")
+    public_url: Annotated[str, values.readable(values.read_public_url)] | None = Field(
+        None, description="where people reach this service, for links"
+    )
 
     mqtt_url: Annotated[str, values.readable(values.read_mqtt_url)] | None = Field(
         None,
@@ -316,6 +318,13 @@ class Settings(BaseSettings):
     def zone(self) -> tzinfo:
         """The cameras' zone; UTC needs no zone database."""
         return UTC if self.timezone == "UTC" else ZoneInfo(self.timezone)
+
+    @field_validator("*")
+    @classmethod
+    def _can_be_counted_by(cls, value: object, info: ValidationInfo) -> object:
+        if isinstance(value, int | float):
+            values.check_number(str(info.field_name), value)
+        return value
 
     @field_validator("proxy_from")
     @classmethod

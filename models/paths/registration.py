@@ -32,7 +32,7 @@ class Belief:
 
     def log_density(self, candidate: Array) -> float:
         """The log density up to a constant."""
-        apart = self._apart(candidate)
+        apart = parameters_apart(candidate, self.mean)
         squared = float(apart[:3] @ self.precision[:3, :3] @ apart[:3])
         return -0.5 * squared - math.log1p(0.5 * float(self.precision[3, 3]) * apart[3] ** 2)
 
@@ -41,12 +41,9 @@ class Belief:
 
         Source: Holland and Welsch 1977, iteratively reweighted least squares.
         """
-        apart, precision = self._apart(candidate), self.precision.copy()
+        apart, precision = parameters_apart(candidate, self.mean), self.precision.copy()
         precision[3, 3] /= 1 + 0.5 * precision[3, 3] * apart[3] ** 2
         return -precision @ apart, precision
-
-    def _apart(self, candidate: Array) -> Array:
-        return parameters_apart(candidate, self.mean)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

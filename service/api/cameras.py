@@ -260,7 +260,7 @@ def change(
     `If-Match` is the ETag of the camera as it was read; without it the answer, 428, has it in
     `etag`, and so has that of a change made of an older version, 412.
     """
-    speed = body.walking_speed
+    speed = {} if body.walking_speed is None else body.walking_speed.model_dump(exclude_unset=True)
     view = cameras.change_camera(
         session,
         state.queue,
@@ -274,8 +274,8 @@ def change(
             intrinsics=body.lens_value(),
             prior_pose=None if body.prior_pose is None else body.prior_pose.to_value(),
             frame_rate_hz=body.frame_rate_hz,
-            walking_speed_mean_mps=None if speed is None else speed.mean_mps,
-            walking_speed_sd_mps=None if speed is None else speed.sd_mps,
+            walking_speed_mean_mps=speed.get("mean_mps"),
+            walking_speed_sd_mps=speed.get("sd_mps"),
             reference_tracks=body.reference_tracks,
             snapshot_url=body.snapshot_url,
         ),

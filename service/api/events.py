@@ -32,9 +32,10 @@ async def events(
     event without a state says that its camera was registered, changed or removed.
     """
     given = (last_event_id or "").strip()
-    seen = min(int(given), _MAX_ID) if _ID.fullmatch(given) else after
-    if seen is None:
-        seen = await state.feed.newest()
+    asked = int(given) if _ID.fullmatch(given) else after
+    newest = await state.feed.newest()
+    # Of a store that was put back to an earlier one, the client knows more than there is.
+    seen = newest if asked is None else min(asked, newest)
     heard_s = checked_s = time.monotonic()
     # With an id: who loses the connection before the first event goes on from here, too.
     yield ServerSentEvent(comment="connected", retry=2000, id=str(seen))

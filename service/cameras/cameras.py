@@ -216,7 +216,6 @@ def change_camera(
     }
     lens = {} if change.intrinsics is None else _columns(change.intrinsics)
     size = record.width, record.height
-    resized = (lens.get("width", size[0]), lens.get("height", size[1])) != size
     for name, value in {**changed, **lens}.items():
         if name not in ("intrinsics", "prior_pose"):
             setattr(record, name, value)
@@ -231,7 +230,8 @@ def change_camera(
         reference.wanted = change.reference_tracks
         request_estimate(session, queue, camera_id)
     geometry_changed = change.intrinsics is not None or change.prior_pose is not None
-    if geometry_changed or change.walking_speed_mean_mps is not None:
+    speed_changed = "walking_speed_mean_mps" in changed or "walking_speed_sd_mps" in changed
+    if geometry_changed or speed_changed:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
             close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, by))
@@ -242,11 +242,13 @@ def change_camera(
         prior = cameras.prior_pose(session, camera_id)
         pose, origin = change.prior_pose or prior.pose, Origin.CHANGED
         given: Sequence[str] = ()
+        hints: Sequence[dict[str, Any]] = ()
         covariance: list[list[float]] | None = None
         if change.prior_pose is None:  # how sure it is, and what was marked, stays
             covariance = prior.covariance
             if prior.assumed:
                 origin, given = Origin.ASSUMED, prior.given
+                hints = prior.hints if (record.width, record.height) == size else ()
         held = held_pose(session, camera_id)
         renew_prior_pose(
             session,
@@ -258,12 +260,10 @@ def change_camera(
             from_s=from_s,
             by=by,
             given=given,
+            hints=hints,
             covariance=covariance,
         )
-        now = cameras.prior_pose(session, camera_id)
-        if now.assumed and not resized:
-            now.hints = prior.hints
-        if held.assumed and not now.assumed:
+        if held.assumed and origin != Origin.ASSUMED:
             keep_drawn(session, camera_id, held)
     words = {name: value for name, value in changed.items() if name in _DESCRIBING}
     # An answer about the pose can be taken back after other words for the camera.
@@ -325,13 +325,16 @@ def renew_prior_pose(
     from_s: float | None,
     by: str | None,
     given: Sequence[str] = (),
+    hints: Sequence[dict[str, Any]] = (),
     covariance: list[list[float]] | None = None,
 ) -> None:
     """Make a pose the prior pose, with a reference of the tracks that start at or after a time.
 
     It is trained at, instead of whatever training is under way; but one that is assumed is not.
     """
-    add_prior_pose(session, camera_id, pose, origin, by, given=given, covariance=covariance)
+    add_prior_pose(
+        session, camera_id, pose, origin, by, given=given, hints=hints, covariance=covariance
+    )
     begin_reference(session, camera_id, origin, from_s=from_s, by=by)
     request_estimate(session, queue, camera_id)
     stop_trainings(session, camera_id)
@@ -347,6 +350,7 @@ def add_prior_pose(
     by: str | None,
     *,
     given: Sequence[str] = (),
+    hints: Sequence[dict[str, Any]] = (),
     covariance: list[list[float]] | None = None,
 ) -> None:
     """Make a pose the prior pose; the earlier ones stay as history."""
@@ -357,6 +361,7 @@ def add_prior_pose(
             origin=origin,
             trusted_by=name_in(session, by),
             given=list(given),
+            hints=list(hints),
             covariance=covariance,
             created_at=datetime.now(UTC),
         )

@@ -66,8 +66,20 @@ class Pictures:
 
 @dataclass(slots=True, kw_only=True)
 class _Count:
-    stored: int
+    """Bytes of the source that counts (True; of all, as long as none does), and of all others."""
+
+    counting: str | None
+    stored: dict[bool, int]
     at_s: float
+
+    def after(self, batch: Batch) -> dict[bool, int]:
+        """The same with a batch, of those for which there are tracks in it."""
+        together: dict[bool, int] = {}
+        for track in batch.tracks:
+            counts = self.counting in (None, track.source)
+            before = together.get(counts, self.stored.get(counts, 0))
+            together[counts] = before + track.stored_bytes
+        return together
 
 
 class Quota:
@@ -77,36 +89,45 @@ class Quota:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._most = settings.keep_mb * 1e6 * _BEYOND or math.inf  # 0: any
+        self._most = settings.keep_mb * 2**20 * _BEYOND or math.inf  # 0: any
         self._counts: dict[str, _Count] = {}
         self._lock = threading.Lock()
 
     def check(self, store: Store, camera_id: str, batch: Batch) -> None:
         """Refuse tracks for which a camera has no room now; the store is asked where that is near.
 
+        The source that counts and all others together have their room each, as of retention.
+
         Raises:
             QuotaError: well more is stored than retention will leave.
         """
-        coming = sum(track.stored_bytes for track in batch.tracks)
         now_s = time.monotonic()
         with self._lock:
             count = self._counts.get(camera_id)
             stale = count is None or (
-                count.stored + coming > self._most and now_s - count.at_s > _RECOUNT_S
+                self._is_too_much(count.after(batch)) and now_s - count.at_s > _RECOUNT_S
             )
         if count is None or stale:
             with store.read() as session:
-                count = _Count(stored=tracks.stored_bytes(session, camera_id), at_s=now_s)
+                counting, stored = tracks.stored_bytes(session, camera_id)
+            count = _Count(counting=counting, stored=stored, at_s=now_s)
         with self._lock:
             self._counts[camera_id] = count
-            if count.stored + coming > self._most:
+            together = count.after(batch)
+            if self._is_too_much(together):
+                most = max(together, key=lambda of_it: together[of_it])
+                whose = "the source that counts" if most else "other sources"
                 raise QuotaError(
-                    f"tracks: {count.stored / 1e6:.1f} MB of this camera are stored; "
-                    f"{self._most / _BEYOND / 1e6:g} MB are kept (SUREFOOT_KEEP_MB), and at "
-                    f"most {_BEYOND:g} times that until older ones are deleted",
+                    f"tracks: with these, {whose} would have {together[most] / 2**20:.1f} MiB of "
+                    f"this camera; {self._most / _BEYOND / 2**20:g} MiB are kept "
+                    f"(SUREFOOT_KEEP_MB), and at most {_BEYOND:g} times that until older ones are "
+                    "deleted",
                     retry_after_s=_COME_BACK_S,
                 )
-            count.stored += coming
+            count.stored |= together
+
+    def _is_too_much(self, together: dict[bool, int]) -> bool:
+        return max(together.values(), default=0) > self._most
 
 
 class Watched:

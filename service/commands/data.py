@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from typer import echo
 
 from service.commands.settings_given import begin
@@ -83,10 +84,10 @@ def check(
     if repair:
         echo(f"{repair_weights(settings)} models deleted, to be trained anew")
     findings = check_data_dir(settings)
-    table = Table("looked at", "verdict", "detail", title=str(settings.data_dir))
+    table = Table("looked at", "verdict", "detail", title=escape(str(settings.data_dir)))
     colours = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.FAULT: "red"}
     for one in findings:
-        table.add_row(one.what, f"[{colours[one.verdict]}]{one.verdict}[/]", one.detail)
+        table.add_row(one.what, f"[{colours[one.verdict]}]{one.verdict}[/]", escape(one.detail))
     Console().print(table)
     raise typer.Exit(int(any(one.verdict is Verdict.FAULT for one in findings)))
 

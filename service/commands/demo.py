@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import math
+import os
 import shutil
 import socket
 import subprocess
@@ -52,6 +53,9 @@ _LONGEST_S = 150.0
 
 def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
     """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
+    # It plays by itself: a site's settings, its database or its broker, are nothing of its.
+    for name in [name for name in os.environ if name.startswith("SUREFOOT_")]:
+        del os.environ[name]
     console = Console()
     started = time.monotonic()
     _remove_left_over()
@@ -65,7 +69,7 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
             recipe="default",
             seed=seed,
             workers=1,
-            auth="off",  # it plays by itself, and with nothing that is anybody's
+            auth="off",  # nothing there is anybody's
         )
         url = f"http://{settings.host}:{settings.port}"
         console.print(f"Watch it in a browser: {url}/ui/cameras/{CAMERA_ID}\n")

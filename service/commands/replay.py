@@ -107,10 +107,13 @@ def post_tracks(
     }
     for _ in range(_TRIES):
         answer = http.post(f"/cameras/{camera_id}/tracks", json=body)
-        wait_s = float(answer.headers.get("retry-after", "inf"))
+        asked = answer.headers.get("retry-after", "")
+        wait_s = float(asked) if asked.isdigit() else math.inf
         if answer.status_code not in (429, 503) or wait_s > _LONGEST_WAIT_S:
             break
         time.sleep(wait_s)
+    if answer.status_code != 422:
+        answer.raise_for_status()  # a proxy's answer need be no JSON
     document: dict[str, Any] = answer.json()
     if document.get("code") == "nothing_taken":  # too short, all of them: the next may be longer
         return {"accepted": 0, "duplicates": 0, "rejected": document["errors"]}

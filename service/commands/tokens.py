@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from service.commands.asking import account
@@ -69,10 +70,10 @@ def list_all(data_dir: DataDir = None) -> None:
         for record in access.every(session):
             table.add_row(
                 record.id,
-                record.name,
+                escape(record.name),
                 ", ".join(record.scopes),
-                "all" if record.cameras is None else ", ".join(record.cameras),
-                "all" if record.sources is None else ", ".join(record.sources),
+                "all" if record.cameras is None else escape(", ".join(record.cameras)),
+                "all" if record.sources is None else escape(", ".join(record.sources)),
                 _time(record.created_at),
                 _time(record.used_at),
                 _end(record),

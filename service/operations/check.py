@@ -145,13 +145,17 @@ def _key(settings: Settings, path: Path) -> Finding:
 
 
 def _modes(folder: Path) -> Finding:
-    wide = [
-        path.name
-        for path in (folder, *folder.rglob("*"))
-        if not path.is_symlink() and stat.S_IMODE(path.stat().st_mode) & 0o077
-    ]
+    wide = [path.name for path in (folder, *folder.rglob("*")) if _is_wide(path)]
     detail = f"others may read {', '.join(wide[:5])}; the next start changes what is ours"
     return _noted("modes", detail if wide else "", "all is its user's alone")
+
+
+def _is_wide(path: Path) -> bool:
+    try:
+        mode = path.stat(follow_symlinks=False).st_mode
+    except FileNotFoundError:  # a service that runs deletes files meanwhile
+        return False
+    return not stat.S_ISLNK(mode) and bool(mode & 0o077)
 
 
 def _space(settings: Settings) -> Finding:

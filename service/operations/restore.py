@@ -179,11 +179,13 @@ def finish_restore(folder: Path) -> Path | None:
     ready = folder / READY
     if not ready.is_dir():
         return None
-    aside_name = ready / "replaced"
-    if not aside_name.exists():
-        aside_name.write_text(f"replaced-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
+    # Kept as a name, which is there whole or not at all: with none, old files would stay in place.
+    named = next(ready.glob("replaced-*"), None)
+    if named is None:
+        named = ready / f"replaced-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+        named.touch()
         sync_folder(ready)
-    aside = folder / aside_name.read_text()
+    aside = folder / named.name
     marker = ready / "moved-aside"
     if not marker.exists():
         for path in (folder / name for name in _REPLACED):

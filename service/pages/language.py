@@ -1,5 +1,6 @@
 """`/ui/language`: the language of pages, as somebody chooses it in their head."""
 
+import contextlib
 from urllib.parse import urlsplit
 
 from fastapi import APIRouter, Request
@@ -18,8 +19,10 @@ router = APIRouter(include_in_schema=False)
 @router.post("/ui/language")
 def choose(request: Request, form: FormDep, state: StateDep) -> RedirectResponse:
     """Keep a language in this browser, and go back to the page that it was chosen on."""
-    here = urlsplit(request.headers.get("referer", ""))
-    back = ours(here.path + (f"?{here.query}" if here.query else ""))
+    back = ""
+    with contextlib.suppress(ValueError):  # of a header that is no URL
+        here = urlsplit(request.headers.get("referer", ""))
+        back = ours(here.path + (f"?{here.query}" if here.query else ""))
     answer = RedirectResponse(back or "/", status_code=303)
     language = form.one("language")
     if language in LANGUAGES:

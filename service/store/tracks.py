@@ -236,13 +236,16 @@ def counts(session: Session, camera_ids: Collection[str]) -> dict[str, int]:
     return {camera_id: number for camera_id, number in session.execute(query)}
 
 
-def stored_bytes(session: Session, camera_id: str) -> int:
-    """The bytes of the points, boxes and heads of a camera's tracks.
+def stored_bytes(session: Session, camera_id: str) -> tuple[str | None, dict[bool, int]]:
+    """The source that counts, and the bytes of points, boxes and heads of a camera's tracks.
 
-    Of the source that counts, or of all others together, if these have more: each has a limit.
+    Those of that source (True; of all, as long as none counts), and of all others together.
     """
-    sizes = select(func.sum(bytes_of_track())).where(TrackRecord.camera_id == camera_id)
-    return max(session.scalars(sizes.group_by(of_counting_source(camera_id))), default=0)
+    counts = of_counting_source(camera_id)
+    sizes = select(counts, func.sum(bytes_of_track())).where(TrackRecord.camera_id == camera_id)
+    rows = session.execute(sizes.group_by(counts))
+    stored = {bool(of_it): int(size) for of_it, size in rows}
+    return session.scalar(counting_source(camera_id)), stored
 
 
 def newest_end_s(session: Session, camera_id: str) -> float | None:

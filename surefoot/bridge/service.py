@@ -130,12 +130,24 @@ class Service:
         return document
 
 
+def _document(answer: httpx.Response) -> Any:
+    """The JSON of an answer; None where it has none, whatever its type says."""
+    if "json" not in answer.headers.get("content-type", ""):
+        return None
+    try:
+        return answer.json()
+    except ValueError:
+        return None
+
+
 def _check(answer: httpx.Response) -> None:
     if answer.is_success:
         return
     status = answer.status_code
-    is_problem = "json" in answer.headers.get("content-type", "")
-    problem = answer.json() if is_problem else {}
+    problem = _document(answer)
+    is_problem = isinstance(problem, dict)
+    if not is_problem:
+        problem = {}
     code, detail = problem.get("code", "unknown"), problem.get("detail", answer.text[:200])
     # What does not speak as the service does stands before it, or in its place.
     if 400 <= status < 500 and status not in _FOR_NOW and is_problem:

@@ -124,6 +124,14 @@ def test_bodies_too_large_are_refused_in_its_words(proxied):
         assert json.loads(answer.text)["status"] == 413
 
 
+def test_pictures_may_be_larger_than_other_bodies(proxied):
+    jpeg = {**proxied.bearer, "Content-Type": "image/jpeg"}
+    for method, kind in (("PUT", "snapshot"), ("PUT", "plan"), ("POST", "aim")):
+        path, body = f"/cameras/corner/{kind}", b" " * 2**21
+        answer = proxied.http.request(method, path, content=body, headers=jpeg)
+        assert answer.status_code != 413, answer.text  # pictures are off here, and this is none
+
+
 def test_slow_bodies_wait_there_and_take_no_connection_of_ours(proxied):
     head = (
         "POST /cameras/corner/tracks HTTP/1.1\r\nHost: surefoot.example\r\n"

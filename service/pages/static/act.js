@@ -11,15 +11,16 @@ export class Refused extends Error {
 }
 
 /**
- * The body of the answer to a call; null where it has none.
+ * The body of the answer to a call, with JSON or a file; null where it has none.
  *
  * Throws Refused for a problem document, and for a service that does not answer.
  */
 export async function call(method, url, body, headers = {}) {
   const given = { method, headers: { Accept: "application/json", ...headers } };
   if (body !== undefined) {
-    given.body = JSON.stringify(body);
-    given.headers["Content-Type"] = "application/json";
+    const isFile = body instanceof Blob;
+    given.body = isFile ? body : JSON.stringify(body);
+    given.headers["Content-Type"] ??= isFile ? body.type : "application/json";
   }
   let answer;
   try {
@@ -30,16 +31,8 @@ export async function call(method, url, body, headers = {}) {
   const isJson = answer.status !== 204 && (answer.headers.get("Content-Type") || "").includes("json");
   const document = isJson ? await answer.json() : null;
   if (answer.ok) return document;
+  // Of a proxy, say; with HTTP/2 there is no text of a status.
   throw new Refused(document ?? { title: _("Error {status}", { status: answer.status }), detail: answer.statusText });
-}
-
-/** The answer to a file that is sent; it throws as `call` does. */
-export async function sendFile(url, file) {
-  const headers = { "Content-Type": file.type, Accept: "application/json" };
-  const answer = await fetch(url, { method: "PUT", body: file, headers });
-  const document = await answer.json();
-  if (!answer.ok) throw new Refused(document);
-  return document;
 }
 
 // What a person can do about an answer that programs read.
@@ -67,7 +60,7 @@ export function showProblem(error) {
   const dialog = document.getElementById("problem");
   document.getElementById("problem-title").textContent = _("That was not done");
   document.getElementById("problem-detail").textContent =
-    status === 409 ? said + plainly(detail) : said || plainly(detail ?? _("no reason was given"));
+    status === 409 ? said + plainly(detail) : said || plainly(detail || (error.problem?.title ?? _("no reason was given")));
   const reasons = error.problem?.errors?.length > 1 ? error.problem.errors : [];
   document.getElementById("problem-errors").replaceChildren(
     ...reasons.map(({ pointer, reason }) => {

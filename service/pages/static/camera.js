@@ -1,6 +1,6 @@
 // The page of a camera: what happens is fetched and exchanged part by part; actions are calls.
 
-import { announce, call, confirmed, guarded, sendFile } from "./act.js";
+import { announce, call, confirmed, guarded } from "./act.js";
 import { ALERT_ACTS, done, listen, planMaintenance } from "./alert_acts.js";
 import { myName, nameMe, signed } from "./dialogs.js";
 import { debounced, subscribe } from "./events.js";
@@ -165,7 +165,7 @@ root.addEventListener("input", ({ target }) => {
 });
 
 async function sendStill(file) {
-  await sendFile(`${path}/snapshot`, file);
+  await call("PUT", `${path}/snapshot`, file);
   announce(_("The still image is kept."));
   await refresh();
 }

@@ -100,12 +100,8 @@ async function post(file) {
     throw refused(_("Who is logged in here may not post tracks: make a token first, or use a command."));
   }
   says.textContent = _("Posting {name}…", { name: file.name });
-  const headers = { Accept: "application/json", "Content-Type": type };
-  if (token) headers.Authorization = `Bearer ${token}`;
-  const answer = await fetch(addressOf(type), { method: "POST", headers, body: file });
-  const body = await answer.json();
-  if (!answer.ok) throw new Refused(body);
-  const { accepted, duplicates, rejected, left_out } = body;
+  const headers = { "Content-Type": type, ...(token && { Authorization: `Bearer ${token}` }) };
+  const { accepted, duplicates, rejected, left_out } = await call("POST", addressOf(type), file, headers);
   const counts = { taken: accepted, known: duplicates, refused: rejected.length };
   const parts = [_("{taken} taken, {known} known before, {refused} refused", counts)];
   if (left_out) parts.push(_("{n} of no person left out", { n: left_out }));

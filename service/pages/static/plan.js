@@ -1,6 +1,6 @@
 // A plan or an aerial picture: measured, kept, and pointed at for the metres of a map point.
 
-import { Refused, announce, call, confirmed, guarded, sendFile } from "./act.js";
+import { Refused, announce, call, confirmed, guarded } from "./act.js";
 import { drags, drawMarks, stepped } from "./pointing.js";
 import { _ } from "./words.js";
 
@@ -111,7 +111,7 @@ async function keep() {
   says.textContent = "";
   const query = new URLSearchParams({ metres_per_pixel: number(metres_per_pixel), north_deg: number(north_deg) });
   try {
-    plan = await sendFile(`${url}?${query}`, measured.file);
+    plan = await call("PUT", `${url}?${query}`, measured.file);
   } catch (error) {
     if (!(error instanceof Refused)) throw error;
     const [{ pointer = "", reason } = {}] = error.problem.errors ?? [];

@@ -1,6 +1,6 @@
 // The form's preview, drawn by the server while somebody types; nothing is stored before the end.
 
-import { announce, call, guarded, Refused, showProblem } from "./act.js";
+import { announce, call, guarded, showProblem } from "./act.js";
 import { debounced } from "./events.js";
 import { _, _n } from "./words.js";
 
@@ -105,12 +105,9 @@ async function send(input, url, type, use) {
   input.removeAttribute("aria-invalid");
   if (!file) return;
   try {
-    const headers = { "Content-Type": type, Accept: "application/json" };
-    const answer = await fetch(url, { method: "POST", headers, body: file });
-    const document_ = await answer.json();
-    if (!answer.ok) throw new Refused(document_);
-    use(document_);
-    help.textContent = document_.text;
+    const answer = await call("POST", url, file, { "Content-Type": type });
+    use(answer);
+    help.textContent = answer.text;
     await look();
   } catch (error) {
     const reason = error.problem?.errors?.[0]?.reason;

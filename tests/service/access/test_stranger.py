@@ -105,6 +105,11 @@ def test_a_token_that_is_revoked_is_let_in_no_more_and_its_stream_ends(closed):
     assert ended.wait(30)
 
 
+def test_names_in_brackets_are_listed_as_they_are(closed):
+    surefoot(closed.settings, "token", "add", "gate [/] [red]2", "--scope", "read")
+    assert "gate [/] [red]2" in surefoot(closed.settings, "token", "list")
+
+
 def test_a_replay_is_let_in_with_a_token(closed):
     with Store(closed.settings).write() as session:
         spec = TokenSpec(name="replay", scopes=("admin", "ingest"))

@@ -12,6 +12,7 @@ import uvicorn
 from service.api.middleware.connections import ConnectionGuard, GuardedProtocol
 from service.app import create_app
 from service.commands.serve import listen
+from tests.conftest import CAMERA
 from tests.running import served, wait_for
 
 
@@ -154,6 +155,19 @@ def healthy(address):
 def test_a_last_event_id_that_is_none_opens_a_stream(api, given):
     made = connect(api)
     assert follows(made, b"Last-Event-ID: " + given + b"\r\n")
+    made.close()
+
+
+def test_who_knows_more_than_the_store_hears_what_comes(api):
+    """A client of before the store was put back to an earlier one."""
+    made = connect(api)
+    assert follows(made, b"Last-Event-ID: 1000000\r\n")
+    api.http.post("/cameras", json=CAMERA).raise_for_status()
+    found = b""
+    while b"event: pose" not in found:
+        chunk = made.recv(65536)
+        assert chunk, found
+        found += chunk
     made.close()
 
 

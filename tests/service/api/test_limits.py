@@ -2,6 +2,7 @@
 
 from contextlib import contextmanager
 
+import httpx
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -113,6 +114,24 @@ def test_so_many_cameras(settings):
         assert client.post("/cameras", json={**CAMERA, "id": "c"}).status_code == 201
 
 
+@pytest.mark.parametrize(
+    ("status", "headers"),
+    [(502, {}), (503, {"retry-after": "Fri, 27 Nov 2026 21:00:00 GMT"})],
+)
+def test_a_replay_tells_what_a_proxy_answers(status, headers):
+    def proxy(_):
+        return httpx.Response(status, text="<html>busy</html>", headers=headers)
+
+    points = np.array(track("1")["points"])
+    walk = Trajectory(time_s=points[:, 0], uv=points[:, 1:])
+    seen = [SceneTrack(track_id="1", trajectory=walk)]
+    with (
+        httpx.Client(base_url="http://surefoot", transport=httpx.MockTransport(proxy)) as http,
+        pytest.raises(httpx.HTTPStatusError, match=str(status)),
+    ):
+        post_tracks(http, "corner", seen, 0.0)
+
+
 def test_a_camera_has_its_bytes(settings, monkeypatch):
     """A track of 20 points has 480 bytes: 0.02 MB are kept, and half more until some go."""
     with client_of(settings, keep_mb=0.02) as client:
@@ -149,3 +168,20 @@ def test_two_sources_within_their_limits_are_refused_nothing(settings, monkeypat
                 body = {"source": source, "tracks": [track(f"{source}{n}")]}
                 assert client.post(URL, json=body).status_code == 202
         assert client.post(URL, json={"source": "a", "tracks": [track("a35")]}).status_code == 202
+
+
+def test_a_source_that_floods_has_no_tracks_of_the_other_refused(settings, monkeypatch):
+    monkeypatch.setattr("service.cameras.tracks._RECOUNT_S", 0.0)
+    with client_of(settings, keep_mb=0.02) as client:
+
+        def post(source, n):
+            body = {"source": source, "tracks": [track(f"{source}{n}")]}
+            return client.post(URL, json=body)
+
+        assert post("counts", 0).status_code == 202
+        flood = [post("flood", n).status_code for n in range(80)]
+        assert set(flood) == {202, 429}
+        assert post("counts", 1).status_code == 202  # with a count that is taken anew
+        monkeypatch.setattr("service.cameras.tracks._RECOUNT_S", 3600.0)
+        assert post("counts", 2).status_code == 202
+        problem(post("flood", 80), 429, "quota_exceeded")

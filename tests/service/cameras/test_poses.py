@@ -236,6 +236,18 @@ def test_other_tracks_are_wanted_after_another_pose_but_not_after_another_speed(
         assert body["reason"] == f"{left} of 200 people for the reference"
 
 
+def test_what_is_left_out_of_a_walking_speed_stays(corner):
+    for change, kept in (
+        ({"mean_mps": 1.2, "sd_mps": 0.3}, {"mean_mps": 1.2, "sd_mps": 0.3}),
+        ({"mean_mps": 1.1}, {"mean_mps": 1.1, "sd_mps": 0.3}),
+        ({"sd_mps": 0.2}, {"mean_mps": 1.1, "sd_mps": 0.2}),
+        ({}, {"mean_mps": 1.1, "sd_mps": 0.2}),
+    ):
+        body = {"walking_speed": change}
+        answer = corner.patch("/cameras/corner", json=body, headers={"If-Match": "*"})
+        assert answer.json()["walking_speed"] == kept
+
+
 def test_history_is_a_series_between_two_times(bench):
     for tilt_deg in (0.0, 0.5, 1.0):
         bench.see(moved(tilt_deg=tilt_deg), sd_deg=0.01)

@@ -43,6 +43,11 @@ def start(command, data_dir, *flags, code=1, **variables):
         ("RECIPE", "soup", "SUREFOOT_RECIPE: .*'default' or 'paper', got 'soup'"),
         ("WEBHOOK_ALLOW", "10.0.0.0/99", "SUREFOOT_WEBHOOK_ALLOW: .*'10.0.0.0/99'"),
         ("TIMEZONE", "Mars/Base", "SUREFOOT_TIMEZONE: .*'Mars/Base'"),
+        ("PUBLIC_URL", "a.example", "SUREFOOT_PUBLIC_URL: http://host:port .*, got 'a.example'"),
+        ("KEEP_DAYS", "1e9", "SUREFOOT_KEEP_DAYS: at most 36500 is taken, got 1000000000.0"),
+        ("KEEP_MB", "inf", "SUREFOOT_KEEP_MB: at most 2147483647 is taken, got inf"),
+        ("KEEP_EVENTS", "9" * 30, "SUREFOOT_KEEP_EVENTS: at most 2147483647 is taken, got 9{30}"),
+        ("WEBHOOK_RETRY_S", "5,inf", "SUREFOOT_WEBHOOK_RETRY_S: numbers above 0, .*'5,inf'"),
         ("SECRET_KEY", "hunter2", "SUREFOOT_SECRET_KEY: 32 bytes in base64 .*openssl"),
     ],
 )
@@ -181,6 +186,9 @@ def test_a_demo_keeps_out_of_a_service_that_runs(tmp_path):
 def test_nothing_stays_of_a_demo_that_was_ended(tmp_path, end):
     port = free_port()
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    # A site's database and broker are nothing of its.
+    environment["SUREFOOT_DATABASE_URL"] = "postgresql://nobody@127.0.0.1:1/site"
+    environment["SUREFOOT_MQTT_URL"] = "mqtt://127.0.0.1:1"
     command = [sys.executable, "-m", "service.cli", "demo", "--port", str(port), "--no-stay"]
     demo = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
     wait_for(lambda: _answers(port))

@@ -2,8 +2,10 @@
 
 import os
 import sqlite3
+from pathlib import Path
 
 from service.commands.migrate import migrate
+from service.data_dir import make_private
 from service.operations.check import check_data_dir, repair_weights
 from tests.service.notifications.test_sealing import hook
 from tests.service.store.test_backup import with_model
@@ -12,6 +14,16 @@ from tests.test_migrations import put
 
 def verdicts(settings):
     return {one.what: (one.verdict, one.detail) for one in check_data_dir(settings)}
+
+
+def test_what_is_deleted_meanwhile_is_nothing_wrong(settings, monkeypatch):
+    migrate(settings)
+    gone = settings.weights_dir / "half.partial"
+    settings.weights_dir.mkdir(mode=0o700, exist_ok=True)
+    listed = Path.rglob
+    monkeypatch.setattr(Path, "rglob", lambda self, pattern: [*listed(self, pattern), gone])
+    assert verdicts(settings)["modes"][0] == "ok"
+    make_private(settings.data_dir)
 
 
 def test_check_finds_what_is_wrong_and_repairs_weights(settings):
