@@ -1,8 +1,8 @@
 """What one look at a camera may read: of more, the largest tracks count and are not looked at.
 
 CPU and memory of a look grow with the rows that are made of its tracks, one for each node and
-another for its box or head, and with their points, which is known before any is read: 30,000 rows
-are up to 30 CPU-s of an estimate, 4 of a map, and 60 MB.
+another for its box or head, and with their points, which is known before any is read: 25,000 rows
+are up to 35 CPU-s of an estimate, 4 of a map, and 60 MB.
 """
 
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from models.tracks.trajectory import most_nodes
 
-_MOST_ROWS = 30_000  # recorded windows of 400 tracks have 18,400 at most
-MAP_BUDGETS = 2.5  # of a map's growth: recorded are 61,000 rows of 2,000 tracks
+_MOST_ROWS = 25_000  # recorded windows of 400 tracks have 18,400 at most
+MAP_BUDGETS = 3.0  # of a map's growth: recorded are 61,000 rows of 2,000 tracks
 _POINT_BYTES = 24  # of which a track with neither boxes nor heads is
 _MOST_BYTES = 96e6  # of points, boxes and heads: of 2,000 people 35 s at 25 Hz, with boxes
 

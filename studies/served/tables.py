@@ -45,7 +45,7 @@ _SHOWN = (
 
 def all_tables(heading: Heading, found: Iterable[CaseResult]) -> str:
     """Every table that there is something for, under a line that says whence."""
-    rows = list(found)
+    rows = sorted(found, key=lambda each: _place(each.case_id))
     seeds = sorted({each.case_id.seed for each in rows})
     batches = sorted({each.case_id.batch for each in rows})
     tables = [
@@ -73,6 +73,11 @@ def all_tables(heading: Heading, found: Iterable[CaseResult]) -> str:
     if judged:
         tables.append(_reliability_table(judged))
     return "\n".join(f"{each.rstrip()}\n" for each in tables)
+
+
+def _place(case_id: CaseId) -> tuple[int, str, int]:
+    """The place of a case, of whichever process came first; those of one task keep their order."""
+    return list(Table).index(case_id.table), case_id.scene, case_id.reference or 0
 
 
 _Cases = Sequence[tuple[CaseId, ServedOutcome]]
