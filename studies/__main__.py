@@ -75,8 +75,11 @@ def protocol(
         list[Path], typer.Argument(help="Folders of scenes and of long recordings.")
     ],
     tables: Annotated[
-        str, typer.Option(help="Of time, people, faults, replays, few, far, names; with commas.")
-    ] = "time,people,faults,replays,few,far,names",
+        str,
+        typer.Option(
+            help="Of time, people, midway, faults, replays, few, far, names; with commas."
+        ),
+    ] = "time,people,midway,faults,replays,few,far,names",
     seeds: Annotated[int, typer.Option(min=1, help="How many of each.")] = 2,
     seed: Annotated[int, typer.Option(min=0, help="The first of them.")] = 0,
     faults: Annotated[str, typer.Option(help="Which faults, with commas; all unless said.")] = "",

@@ -126,6 +126,7 @@ def draw_case(
     parting: Parting = HALVES_OF_PEOPLE,
     fault: Fault | None = None,
     heading_rad: float | None = None,
+    still_share: float = 0.0,
 ) -> ProtocolCase:
     """Part a scene's people in two and offset the camera before the second.
 
@@ -139,6 +140,7 @@ def draw_case(
         parting: who is the reference, and who comes after the offset.
         fault: what is wrong with the tracks, before the offset too unless it sets in later.
         heading_rad: the offset of the heading; else it is drawn, too.
+        still_share: the share of those who come after the reference whom the still camera sees.
     """
     rng = np.random.default_rng(seed)
     parts = part_people(scene, parting, rng)
@@ -153,13 +155,19 @@ def draw_case(
         offset = replace(offset, heading_rad=heading_rad)
     still, moved = scene.true_pose, offset.apply(scene.true_pose)
     begin = rng.uniform() if parting.seen_tracks is not None else 0.0
+    unmoved = still if scene.beyond_picture else None
     reference: Sequence[SceneTrack] = first_seen(
-        scene, parts.reference, still if scene.beyond_picture else None, parting.reference_tracks
+        scene, parts.reference, unmoved, parting.reference_tracks
     )
     later = parts.later
     if parting.seen_tracks is not None:
         later = later[int(begin * max(len(later) - parting.seen_tracks, 0)) :]
-    seen: Sequence[SceneTrack] = first_seen(scene, later, moved, parting.seen_tracks)
+    most = len(later) if parting.seen_tracks is None else min(len(later), parting.seen_tracks)
+    before = int(still_share * most)
+    seen: Sequence[SceneTrack] = [
+        *first_seen(scene, later[:before], unmoved, None),
+        *first_seen(scene, later[before:], moved, most - before),
+    ]
     if fault is not None:
         if not fault.later:
             reference = fault.inject(reference, view_of(scene), seed)

@@ -24,7 +24,7 @@ from studies.served.tasks import Table, tasks_of, work
 BETWEEN = markers("parts", "python -m studies parts --write")
 WHOLE = "nothing"
 _BATCH = 50  # tracks that come at once
-_TABLES = (Table.FEW, Table.FAR)
+_TABLES = (Table.FEW, Table.FAR, Table.MIDWAY)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

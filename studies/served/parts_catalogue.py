@@ -192,5 +192,6 @@ PARTS: dict[str, Part] = {
             "models/pose/change_point.py",
             *(f"models.paths.path_tests:{name}" for name in _TESTS_OF_PLACES),
         ),
+        faults=("midway",),
     ),
 }

@@ -55,7 +55,7 @@ def all_tables(heading: Heading, found: Iterable[CaseResult]) -> str:
     ]
     cases = [(e.case_id, e.outcome) for e in rows if isinstance(e.outcome, ServedOutcome)]
     replays = [(e.case_id, e.outcome) for e in rows if isinstance(e.outcome, ReplayOutcome)]
-    if any(case_id.table in (Table.TIME, Table.PEOPLE) for case_id, _ in cases):
+    if any(case_id.table in _WORDS for case_id, _ in cases):
         tables += [_knock_table(cases), _scene_table(cases)]
     if any(case_id.table == Table.FAULTS for case_id, _ in cases):
         tables.append(_fault_table(cases))
@@ -86,7 +86,7 @@ _Cases = Sequence[tuple[CaseId, ServedOutcome]]
 def _knock_table(cases: _Cases) -> str:
     """Over all scenes, by what was moved; the slopes, too."""
     lines = _head("moved", "n", *_SHOWN, "slope: tilt, roll, height, pan")
-    for table, words in ((Table.TIME, "later people"), (Table.PEOPLE, "random people")):
+    for table, words in _WORDS.items():
         for size in _sizes(cases, table):
             for knock, name in _KNOCKS.items():
                 own = [
@@ -122,6 +122,11 @@ def _scene_table(cases: _Cases) -> str:
     return "**By scene**:\n\n" + "\n".join(lines)
 
 
+_WORDS = {
+    Table.TIME: "later people",
+    Table.PEOPLE: "random people",
+    Table.MIDWAY: "after half of them",
+}
 _WITHOUT_PAN = ("knock", "tilt-alone", "roll-alone", "height-alone")
 _WITH_PAN = ("pan", "pan-alone")
 assert set(ALONE) <= {*_WITHOUT_PAN, *_WITH_PAN}

@@ -30,6 +30,7 @@ class Table(StrEnum):
     REPLAYS = "replays"
     FEW = "few"
     FAR = "far"
+    MIDWAY = "midway"
     NAMES = "names"
 
 
@@ -38,6 +39,7 @@ _KNOCKS = {
     Table.TIME: ("still", "pan", "knock", *ALONE),
     Table.PEOPLE: ("still", "pan", "knock", "pan-alone"),
     Table.FAULTS: ("still", "pan"),
+    Table.MIDWAY: ("still", "pan", "knock", *ALONE),
     Table.FEW: ("still", "tilt-alone", "pan-alone", "pan"),
 }
 FEW = (8, 15, 20, 40)  # tracks
@@ -232,7 +234,8 @@ def _served(
     far = case_id.table == Table.FAR
     heading = math.radians(float(case_id.knock.removeprefix("pan"))) if far else None
     drawn = RANGES["still" if far else case_id.knock]
-    case = draw_case(scene, case_id.seed, drawn, parting, fault, heading)
+    still_share = 0.5 if case_id.table == Table.MIDWAY else 0.0
+    case = draw_case(scene, case_id.seed, drawn, parting, fault, heading, still_share)
     if 0 not in sites:  # the tracks before the knock are the same whatever the knock
         known = observe(case.reference, case.intrinsics, case.prior_pose)
         try:

@@ -91,6 +91,24 @@ def test_the_same_seed_knocks_the_same_way_and_hard_knocks_go_farther(scene):
     assert_allclose(hard_drift / drift, [15 / 8, 15 / 8, 0.35 / 0.15], rtol=1e-9)
 
 
+def test_a_move_midway_leaves_the_first_half_as_the_still_camera_saw_it(scene):
+    whole, midway, still = (
+        draw_case(scene, 1, reach, still_share=share)
+        for reach, share in ((KNOCKED, 0.0), (KNOCKED, 0.5), (STILL, 0.0))
+    )
+    assert midway.true_pose == whole.true_pose
+
+    def by_start(case):
+        return {float(track.time_s[0]) // 100: track.uv.round(6).tolist() for track in case.seen}
+
+    seen, moved, unmoved = by_start(midway), by_start(whole), by_start(still)
+    as_before = {time for time, uv in seen.items() if unmoved.get(time) == uv}
+    as_after = {time for time, uv in seen.items() if moved.get(time) == uv}
+    assert set(seen) == as_before | as_after
+    assert max(as_before) < min(as_after)
+    assert min(len(as_before), len(as_after)) >= 13
+
+
 def test_an_answer_is_judged_by_hand_derived_numbers(scene):
     case = draw_case(scene, 5, KNOCKED)
     truth = plane_parameters_of(case.true_pose)
