@@ -124,7 +124,7 @@ def _chart(v: _Values) -> str:
 
 
 def _crept(v: _Values) -> str:
-    said = {"number": _number(v), "since": datetime.fromisoformat(v["since"])}
+    said = {"number": _number(v), "since": datetime.fromisoformat(v["since"]).astimezone(v["zone"])}
     return _(
         "has crept by {by_deg:+.1f} deg (sd {sd_deg:.1f}) in {number} since {since:%Y-%m-%d}, by "
         "the first map and speeds of its reference (creep: {statistic:.0f}, alarm at {level:.0f})",
@@ -213,10 +213,13 @@ def _sure_of_pose(v: _Values) -> str:
 
 
 def _maintenance(v: _Values) -> str:
-    at = datetime.fromisoformat(v["until"]).astimezone(v["zone"])
-    time = f"{at:%Y-%m-%d %H:%M}{'Z' if v['zone'] is UTC else ''}"
-    until = _("maintenance is under way until {time}", time=time)
+    until = _("maintenance is under way until {time}", time=_clock(v["until"], v["zone"]))
     return f"{until} ({v['note']})" if v.get("note") else until
+
+
+def _clock(at: str, zone: tzinfo) -> str:
+    """A time by a zone's clock."""
+    return f"{datetime.fromisoformat(at).astimezone(zone):%Y-%m-%d %H:%M}{'Z' * (zone is UTC)}"
 
 
 def _silent(v: _Values) -> str:
@@ -344,7 +347,10 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     ServiceCode.WITHOUT_PART: lambda v: _(
         "without the {part}: {why}", part=v["part"].replace("_", " "), why=v["why"]
     ),
-    ServiceCode.BY_PICTURE: N_("by a picture of {taken_at}, nobody having walked by since"),
+    ServiceCode.BY_PICTURE: lambda v: _(
+        "by a picture of {taken_at}, nobody having walked by since",
+        taken_at=_clock(v["taken_at"], v["zone"]),
+    ),
     ServiceCode.SITE_CHANGED: N_(
         "the picture says that it stands, and people walk elsewhere: the site changed"
     ),

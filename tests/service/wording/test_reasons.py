@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from zoneinfo import ZoneInfo
 
 import pytest
 
@@ -131,7 +132,7 @@ SAID = [
     (S.WITHOUT_PART, {"part": "flow_map", "why": "cannot be read"},
      "without the flow map: cannot be read"),
     (S.BY_PICTURE, {"taken_at": "2026-11-25T09:30:00Z"},
-     "by a picture of 2026-11-25T09:30:00Z, nobody having walked by since"),
+     "by a picture of 2026-11-25 09:30Z, nobody having walked by since"),
     (S.SITE_CHANGED, {},
      "the picture says that it stands, and people walk elsewhere: the site changed"),
     (S.PICTURE_SHIFTED, {},
@@ -202,6 +203,18 @@ def test_reasons_are_said_one_after_the_other():
         "1 of 2 people for the reference"
     )
     assert in_words(some(None, *as_said("far"), None)) == "far"
+
+
+@pytest.mark.parametrize(
+    ("code", "name", "words"),
+    [
+        (S.MAINTENANCE, "until", "until 2026-11-25 18:30"),
+        (S.BY_PICTURE, "taken_at", "of 2026-11-25 18:30,"),
+    ],
+)
+def test_times_are_said_by_the_operators_clock(code, name, words):
+    reason = Reason(code=code, values={name: "2026-11-25T09:30:00Z"})
+    assert words in in_words((reason,), ZoneInfo("Asia/Tokyo"))
 
 
 def test_a_group_is_said_beside_its_trackers_name_without_it():
