@@ -21,7 +21,7 @@ from service.formats.track import Clock, Limits
 from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
 from service.pages.registration_form import RegistrationForm
-from service.wording.language import N_, _
+from service.wording.language import N_, _, _n
 from service.wording.typed_pose import (
     Saying,
     judge_pose,
@@ -184,11 +184,11 @@ def tracks(
         frames = np.round((track.points[:, 0] - _AN_EPOCH_S) * frame_rate_hz)
         points = np.column_stack([frames, np.round(track.points[:, 1:], 1)])
         thinned.append(points[:: max(-(-len(points) // _MOST_POINTS), 1)].tolist())
-    text = _("{n} tracks read", n=len(batch.tracks))
+    text = _n("{n} track read", "{n} tracks read", len(batch.tracks))
     if len(some) < len(batch.tracks):
         text += _(", {n} of them shown", n=len(some))
     if batch.left_out:
-        text += _("; {n} lines are of no person", n=batch.left_out)
+        text += _n("; {n} line is of no person", "; {n} lines are of no person", batch.left_out)
     if batch.rejections:
         first = batch.rejections[0]
         text += _(

@@ -1,7 +1,7 @@
 """What comes for a camera that learns, in words; and what mends what is refused."""
 
 from models.durations import HOUR_S
-from service.wording.language import N_, _, number
+from service.wording.language import N_, _, _n, number
 from service.wording.times import duration
 
 _SOON_S = 60.0  # after a track's end: portions and networks take as long
@@ -78,7 +78,7 @@ def ready_words(counted: int, wanted: int, ready_in_s: float | None) -> str:
     if counted >= wanted:
         return _("everybody is there: it is learned at the next look")
     if ready_in_s is None:
-        return _("{n} people are missing", n=wanted - counted)
+        return _n("{n} person is missing", "{n} people are missing", wanted - counted)
     return _("ready in about {time} at this rate", time=duration(max(ready_in_s, 1.0)))
 
 

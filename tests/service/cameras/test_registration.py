@@ -157,7 +157,7 @@ def test_a_motchallenge_file_is_thinned_and_not_stored(http):
     (track,) = answer["tracks"]
     assert len(track) == 40
     assert track[1] == [4.0, 934.0, 679.0]  # counted from 0
-    assert answer["text"].startswith("1 tracks read; 1 left out, the first since: 1 points")
+    assert answer["text"].startswith("1 track read; 1 left out, the first since: 1 points")
     wrong = http.post("/ui/tracks", params=query, content="hello", headers=text)
     assert wrong.status_code == 422
 

@@ -180,7 +180,7 @@ def test_the_form_to_register_with_reads_it_the_same(http):
         params={"width": 1280, "height": 720},
         content="\n".join(walk("p", "1,1,0.9") + walk("c", "1,3,0.9")),
     ).json()
-    assert answer["text"] == "1 tracks read; 6 lines are of no person."
+    assert answer["text"] == "1 track read; 6 lines are of no person."
     assert answer["tracks"][0][0] == [0.0, 120.0, 200.0]
 
 

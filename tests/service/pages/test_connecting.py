@@ -160,3 +160,4 @@ def test_clocks_that_differ_are_told_from_portions_and_recordings():
 def test_nobody_is_missing_where_all_are_there():
     assert ready_words(200, 200, 0.0) == "everybody is there: it is learned at the next look"
     assert ready_words(0, 200, None) == "200 people are missing"
+    assert ready_words(199, 200, None) == "1 person is missing"
