@@ -69,7 +69,8 @@ def make_shift(session: Session, since: datetime, clock: Clock) -> Shift:
         )
     }
     names = dict(fleet.names(session, None))
-    entries = journal.activity_after(session, None, 0, _MOST_ACTS + 1, since=since)
+    most = _MOST_ACTS + 1
+    entries = journal.activity_after(session, None, 0, most, since=since, from_newest=True)
     windows = fleet.maintenance_windows(session, None)
     return Shift(
         **{
@@ -84,7 +85,7 @@ def make_shift(session: Session, since: datetime, clock: Clock) -> Shift:
 
 
 def _deeds(entries: Sequence[ActivityRecord], names: dict[str, str], clock: Clock) -> list[Deed]:
-    """What people did, the last first; the same with many cameras is one deed."""
+    """What people did, the last first as the entries are; the same with many cameras is one."""
     cameras: dict[str, dict[str, str]] = {}
     last: dict[str, datetime] = {}
     for entry in entries:
@@ -96,9 +97,11 @@ def _deeds(entries: Sequence[ActivityRecord], names: dict[str, str], clock: Cloc
         mine = cameras.setdefault(words, {})
         if entry.camera_id is not None:
             mine[entry.camera_id] = names.get(entry.camera_id, entry.camera_id)
-        last[words] = entry.at
-    deeds = [Deed(words=w, at=last[w], cameras=tuple(mine.items())) for w, mine in cameras.items()]
-    return sorted(deeds, key=lambda deed: deed.at, reverse=True)
+        last.setdefault(words, entry.at)
+    return [
+        Deed(words=words, at=last[words], cameras=tuple(reversed(mine.items())))
+        for words, mine in cameras.items()
+    ]
 
 
 def hand_over(session: Session, since: datetime, text: str | None, by: str | None) -> Handover:

@@ -121,8 +121,9 @@ def activity_after(
     *,
     since: datetime | None = None,
     before: datetime | None = None,
+    from_newest: bool = False,
 ) -> Sequence[ActivityRecord]:
-    """Entries after one, oldest first; of a camera, or of everything; of all times, or some."""
+    """Entries after one, oldest first unless said; of a camera, or of everything; of some times."""
     query = select(ActivityRecord).where(
         ActivityRecord.id > entry_id, *_settled(session, ActivityRecord)
     )
@@ -132,7 +133,8 @@ def activity_after(
         query = query.where(ActivityRecord.at >= since)
     if before is not None:
         query = query.where(ActivityRecord.at < before)
-    return session.scalars(query.order_by(ActivityRecord.id).limit(limit)).all()
+    order = ActivityRecord.id.desc() if from_newest else ActivityRecord.id
+    return session.scalars(query.order_by(order).limit(limit)).all()
 
 
 def newest_activity(session: Session, camera_id: str, limit: int) -> Sequence[ActivityRecord]:

@@ -4,6 +4,7 @@ import html
 import re
 from datetime import UTC, datetime, timedelta
 
+from service.reports import handover
 from tests.service.conftest import problem
 
 
@@ -54,6 +55,19 @@ def test_a_shift_has_what_was_told_done_and_is_open(http, fleet):
     assert section(http, "Told", **later).startswith("Told and ended none")
     assert section(http, "Done", **later).startswith("Done nothing")
     assert section(http, "Still open", **later).startswith("Still open 2 ")
+
+
+def test_of_more_acts_than_are_shown_the_last_ones_are(http, fleet, monkeypatch):
+    monkeypatch.setattr(handover, "_MOST_ACTS", 2)
+    fleet.add("c0", "Corner 0", tilt_deg=3.0)
+    alert_id = fleet.knock("c0")
+    for name in ("Ada", "Bo", "Cy"):
+        silence = {"until": hours(3), "by": name}
+        http.post(f"/alerts/{alert_id}/silence", json=silence).raise_for_status()
+    done = section(http, "Done", hours=8)
+    assert done.index("Cy silenced") < done.index("Bo silenced")
+    assert "Ada silenced" not in done
+    assert "There is more than is shown" in http.get("/ui/handover", params={"hours": 8}).text
 
 
 def test_a_note_is_shown_to_the_next_until_somebody_takes_it_over(http):
