@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime
+from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import quote
 
@@ -29,7 +30,7 @@ from service.enums import AlertState, EventType, PoseState, Readiness, Reference
 if TYPE_CHECKING:
     from surefoot.bridge.service import Event, Service
 
-_PAGE = 1000  # cameras, and the newest alerts; of either no answer has more
+_MOST_ENDED = 1000  # alerts of all times: the newest
 _FIRST_S, _LONGEST_S = 1.0, 30.0
 
 
@@ -37,8 +38,8 @@ def status(url: Url = LOCAL_URL, token_file: TokenFile = None, as_json: Json = F
     """Say how a running service and its cameras are; 1 where an alert fires or it is not ready."""
     with asked(url, token_file) as service:
         ready = service.readiness()
-        states = Counter(camera["state"] for camera in _all_cameras(service))
-        alerts = service.get("/alerts", state=AlertState.FIRING.value, limit=_PAGE)["items"]
+        states = Counter(camera["state"] for camera in service.items("/cameras"))
+        alerts = list(service.items("/alerts", state=AlertState.FIRING.value))
     severities = Counter(alert["severity"] for alert in alerts)
     waiting = sum(_waits(alert) for alert in alerts)
     if as_json:
@@ -73,7 +74,7 @@ def cameras(
     """List the cameras of a running service with their states."""
     with asked(url, token_file) as service:
         states = [each.value for each in state or ()]
-        found = list(_all_cameras(service, state=states, site=site, tag=tag or []))
+        found = list(service.items("/cameras", state=states, site=site, tag=tag or []))
     if as_json:
         for camera in found:
             tell(camera)
@@ -97,15 +98,11 @@ def alerts(
     as_json: Json = False,
 ) -> None:
     """List the alerts that fire, newest first; 1 where there is one."""
-    query: dict[str, Any] = {"limit": _PAGE}
-    query |= {} if every else {"state": AlertState.FIRING.value}
+    query = {} if every else {"state": AlertState.FIRING.value}
     query |= {} if camera is None else {"camera_id": camera}
     with asked(url, token_file) as service:
-        found = [
-            alert
-            for alert in service.get("/alerts", **query)["items"]
-            if not waiting or _waits(alert)
-        ]
+        listed = islice(service.items("/alerts", **query), _MOST_ENDED if every else None)
+        found = [alert for alert in listed if not waiting or _waits(alert)]
     if as_json:
         for alert in found:
             tell(alert)
@@ -172,14 +169,6 @@ def _following(service: "Service") -> Iterator["Event"]:
             typer.echo(plain(words), err=True)
             time.sleep(delay_s)
             delay_s = min(2 * delay_s, _LONGEST_S)
-
-
-def _all_cameras(service: "Service", **wanted: Any) -> Iterator[Any]:
-    cursor: str | None = ""
-    while cursor is not None:
-        page = service.get("/cameras", **wanted, cursor=cursor, limit=_PAGE)
-        yield from page["items"]
-        cursor = page["next_cursor"]
 
 
 def _counted(counts: Counter[str], words: type[PoseState] | type[Severity]) -> str:

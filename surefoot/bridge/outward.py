@@ -96,12 +96,7 @@ class Outward:
 
     def _find_cameras(self, service: Service) -> set[str]:
         """The cameras that there are; what was said of others is taken back."""
-        found: dict[str, str] = {}
-        cursor: str | None = ""
-        while cursor is not None:
-            page = service.get("/cameras", cursor=cursor, limit=1000)
-            found |= {each["id"]: each["name"] for each in page["items"]}
-            cursor = page["next_cursor"]
+        found = {each["id"]: each["name"] for each in service.items("/cameras")}
         for camera_id in self._known - found.keys():
             self._forget(camera_id)
         for camera_id, name in found.items():
@@ -112,7 +107,7 @@ class Outward:
     def _tell(self, service: Service, changed: set[str]) -> None:
         if not changed:
             return
-        alerts = service.get("/alerts", state="firing", limit=1000)["items"]
+        alerts = list(service.items("/alerts", state="firing"))
         for camera_id in sorted(changed):
             try:
                 if camera_id not in self._known:

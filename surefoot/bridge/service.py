@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import httpx
 
 _TIMEOUT_S = 60.0
+PAGE = 1000  # of a list: no answer has more
 _HEARTBEATS_S = 30.0  # three of the service's: a stream that is silent for longer is none
 # Refusals that another token, or another hour, may end.
 _FOR_NOW = frozenset({401, 403, 408, 429})
@@ -63,6 +64,21 @@ class Service:
         """
         return self._ask("GET", path, params=query)
 
+    def items(self, path: str, **query: Any) -> Iterator[dict[str, Any]]:
+        """All that a list at a path has, page after page.
+
+        Raises:
+            LaterError: there is none for now.
+            RefusedError: there is none.
+        """
+        cursor: dict[str, str] = {}
+        while True:
+            page = self.get(path, limit=PAGE, **query, **cursor)
+            yield from page["items"]
+            if page["next_cursor"] is None:
+                return
+            cursor = {"cursor": page["next_cursor"]}
+
     def post(self, path: str, document: dict[str, Any]) -> dict[str, Any]:
         """The answer to a document.
 
@@ -95,7 +111,7 @@ class Service:
                     answer.read()
                     _check(answer)
                 yield from self._parsed(answer.iter_lines())
-        except httpx.TransportError as error:
+        except httpx.RequestError as error:
             raise LaterError(f"{type(error).__name__}: {error}", away=True) from error
         raise LaterError("the stream has ended", away=True)
 
@@ -123,7 +139,7 @@ class Service:
             if not (told_by_503 and answer.status_code == 503 and own):
                 _check(answer)
             document: dict[str, Any] = answer.json()
-        except httpx.TransportError as error:
+        except httpx.RequestError as error:
             raise LaterError(f"{type(error).__name__}: {error}", away=True) from error
         except ValueError as error:  # a proxy's page
             raise LaterError(f"an answer that is no JSON: {error}", away=True) from error

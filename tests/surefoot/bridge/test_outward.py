@@ -15,11 +15,10 @@ class Service:
         self.state = "learning"
         self.drop = threading.Event()
 
-    def get(self, path, **_):
-        if path == "/cameras":
-            return {"items": [{"id": "yard", "name": ""}], "next_cursor": None}
-        if path == "/alerts":
-            return {"items": []}
+    def items(self, path, **_):
+        return [{"id": "yard", "name": ""}] if path == "/cameras" else []
+
+    def get(self, path):
         return {"state": self.state}
 
     def events(self, after):
