@@ -38,7 +38,7 @@ def learn_chart(
     folds: Folds,
     seed: int,
 ) -> DriftChart | None:
-    """The chart of a site; None where fewer than 12 walking groups have scores.
+    """The chart of a site; None where fewer than 12 walking groups have scores, or all are alike.
 
     Each quarter of the walking groups is scored by what the others say is usual, and some of them
     again as a camera that has moved would see them. How high the statistic gets by chance is
@@ -83,7 +83,10 @@ def learn_chart(
         covariance=_covariance(bounded),
         responses=(after.mean(axis=1) - before.mean(axis=0)).T,
     )
-    reached = _reached(chart, bounded, np.random.default_rng(seed))
+    try:
+        reached = _reached(chart, bounded, np.random.default_rng(seed))
+    except np.linalg.LinAlgError:  # one walk over and over: nothing is known of chance
+        return None
     typical = float(np.median(reached))
     return replace(
         chart, typical=typical, tail=max(float(reached[reached > typical].mean() - typical), 1.0)

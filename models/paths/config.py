@@ -74,11 +74,6 @@ CHANGED_RATE = 1e-4  # of windows with unchanged paths that are called changed
 TIDE, NEW_PATHS = 0.35, 1.0
 FEWEST_FITS = 5  # walking groups on seen ground by which two poses are told apart
 MOSTLY_SEEN = 0.5  # of a place's ground must have been seen
-PEOPLE_SEEN = 0.25  # of people must be on seen ground, for it to hold a pose
-
-# Whether halves of the people find the same heading.
-AWAY_RAD = np.radians(4.0)  # from where it was found, both ways: half of a map's peak
-ABOUT = 0.03  # of the log posterior: a quarter of a standard deviation
 
 # The test of a move within a window.
 # How far both ways a score looks: radians, log height. The map is smoothed by about as much.

@@ -6,16 +6,14 @@ Levenberg 1944. The curvature by differences of the scores is ours.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from models.geometry.pose import parameters_apart
-from models.geometry.rotation import Array, Mask
+from models.geometry.rotation import Array
 from models.paths import config
-from models.paths.ground_steps import place_steps
 from models.paths.likelihood import Likelihood, PathModel, Walkers
-from models.tracks.observations import steps_where
 
 _SHORTEST_SHARE = 1e-3
 
@@ -213,45 +211,3 @@ def _scatter(scores: Array) -> Array:
     used = scores[scores.any(axis=1)]
     centred = used - used.mean(axis=0) if len(used) else used
     return np.asarray(centred.T @ centred)
-
-
-def on_seen_ground(walkers: Walkers, paths: PathModel, candidate: Array) -> bool:
-    """True if enough of what people do, from a candidate (4,), is on ground the reference saw."""
-    placed = place_steps(walkers.steps, candidate)
-    unseen, _ = paths.density.unseen_at(placed.place)
-    seen = float((walkers.weight * placed.valid * (1 - unseen)).sum())
-    return seen / max(float(walkers.weight.sum()), 1e-12) >= config.PEOPLE_SEEN
-
-
-def variance_of_halves(
-    posterior: Posterior, candidate: Array, line: Array, *, afar: bool = True
-) -> float:
-    """The variance of a heading by how far two halves of the walking groups find it apart.
-
-    Each half begins 4 deg to another side of a candidate (4,), the other parameters following along
-    a line (4,): whether it is found from elsewhere, and whether it hangs on a few people, is seen.
-    Not `afar` both begin at the candidate and go about as far as they would, for people of whom
-    most began elsewhere before. It is of one degree of freedom: for telling that
-    something is wrong, and not for an interval.
-    """
-    sides, least_gain = (
-        ((config.AWAY_RAD, -config.AWAY_RAD), config.CONVERGED)
-        if afar
-        else ((0.0, 0.0), config.ABOUT)
-    )
-    ends = [
-        replace(posterior, walkers=half).climbed(candidate + away * line, least_gain).candidate[3]
-        for half, away in zip(_halves(posterior.walkers), sides, strict=True)
-    ]
-    return float((ends[0] - ends[1]) / 2) ** 2
-
-
-def _halves(walkers: Walkers) -> tuple[Walkers, Walkers]:
-    """Every other walking group, and the others."""
-    _, rank = np.unique(walkers.group_idx[walkers.steps.rows.owner_idx], return_inverse=True)
-    first = rank % 2 == 0
-    return _part(walkers, first), _part(walkers, ~first)
-
-
-def _part(walkers: Walkers, kept: Mask) -> Walkers:
-    return replace(walkers, steps=steps_where(walkers.steps, kept), weight=walkers.weight[kept])

@@ -19,7 +19,6 @@ ROUNDS = 2  # of fitting speeds with the heading by places: a third changes hund
 WARM_ROUNDS = 1  # from a warm start, whose heading is known
 UNLIKELY = 12.0  # of the log posterior, below the best: speeds are not fitted again there
 FAR_LOG_HEIGHT = 0.7  # from the speeds': twice as high, everybody walks where nobody was seen
-LARGEST_LOG_HEIGHT = 5.0  # from a pose's: 150 times as high or as low, nothing is seen
 SHARED = 3  # parameters that speeds and places both determine, tilt, roll, height: Birge's freedom
 
 # What a fused estimate needs, and says.
@@ -27,9 +26,6 @@ FEWEST_GROUPS = 5  # walking groups: of fewer, places have no part
 BY_CHANCE = 0.01  # of still cameras seem turned in tilt or roll: else changed paths are a clock's
 RIVAL = 0.05  # odds against the best from which another pose is named
 NO_RIVAL = 1e-6  # odds below which another pose is not even begun at next time
-FAR_APART = 6.6  # of a variance: chi square of one degree of freedom, one case of 100
-CLOSE = 0.5  # of FAR_APART: less than that at a rough look is far from it
-NARROW = 0.1  # of a variance: so little was added to it that a warm start adds the same
 
 # A change of the pose within a window.
 FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their own

@@ -267,8 +267,7 @@ def _still_there(
         return None
     search, suspected = warm_start.search, _suspicion(tracks, site, found)
     if not warm_start.is_calm(suspected):
-        around = found.fused.neighbourhood
-        speeds = None if around is None or suspected > config.SUSPECTED else around.speeds
+        speeds = None if suspected > config.SUSPECTED else found.fused.speeds
         if _moved_by_speeds(tracks, site, found.fused, speeds) is not None:
             return None
         search = replace(search, suspicion=suspected)

@@ -16,10 +16,8 @@ from models.paths.reference import PathReference
 from models.paths.registration import (
     Posterior,
     distinct,
-    on_seen_ground,
     refined,
     shape_at,
-    variance_of_halves,
 )
 from models.pose import config
 from models.pose.modes import (
@@ -27,13 +25,11 @@ from models.pose.modes import (
     belief_of,
     birge_ratio,
     covariance_between,
-    covariance_beyond_gaussian,
     find_modes,
     odds_of,
 )
 from models.pose.pose_fit import (
     FusedEstimate,
-    PathNeighbourhood,
     Rival,
     WarmStart,
     by_speeds_alone,
@@ -83,11 +79,9 @@ def fused_estimate(
     values, covariance = _refined(modes[0], paths, prior, fits, warm_start)
     if covariance[3, 3] > config.HEADING_SD**2:  # the paths say nothing
         return by_speeds_alone(joint, prior, changed())
-    if not on_seen_ground(walkers, posterior.paths, values):
-        return by_speeds_alone(joint, prior, changed() or _unidentifiable(config.HEADING_SD))
     odds = odds_of(modes)
-    extra = _extra_covariance(modes, odds, values, covariance, warm_start)
-    found = _estimate_of(modes, odds, values, covariance + extra, extra, fits, joint, prior)
+    covariance = covariance + covariance_between([mode.peak for mode in modes], odds)
+    found = _estimate_of(modes, odds, values, covariance, fits, joint, prior)
     at_prior = float(posterior.values(array_of(prior)[None])[0])
     return replace(found, prior_gap=2 * (modes[0].peak.value - at_prior))
 
@@ -149,42 +143,11 @@ def _refined(
     shape = shape_at(walkers, mode.posterior.paths, mode.candidate)
     precision = paths.precision(shape, walkers.people, mode.candidate - array_of(prior))
     precision = precision / paths.fit.variance_inflation(fits)
-    warm = warm_start is not None and warm_start.neighbourhood is not None
+    warm = warm_start is not None and warm_start.speeds is not None
     values, covariance = refined(
         mode.posterior, mode.candidate, shape, precision, paths.bias, warm=warm
     )
     return values, covariance * birge_ratio(mode.posterior.belief, precision, values)
-
-
-def _extra_covariance(
-    modes: list[Mode],
-    odds: Array,
-    values: Array,
-    covariance: Array,
-    warm_start: WarmStart | None,
-) -> Array:
-    """The covariance (4, 4) by other modes, by flat tails, and by halves that do not agree."""
-    around = None if warm_start is None else warm_start.neighbourhood
-    if around is not None and around.is_narrow(covariance):
-        return around.extra_covariance
-    extra = covariance_between([mode.peak for mode in modes], odds)
-    extra = extra + covariance_beyond_gaussian(modes[0], covariance + extra)
-    afar = warm_start is None
-    return extra + _covariance_of_halves(modes[0].posterior, values, covariance + extra, afar=afar)
-
-
-def _covariance_of_halves(
-    posterior: Posterior, values: Array, covariance: Array, *, afar: bool
-) -> Array:
-    """The covariance (4, 4) by how far apart halves of the people find the heading, if far."""
-    variance = float(covariance[3, 3])
-    line = covariance[:, 3] / variance
-    by_halves = variance_of_halves(posterior, values, line, afar=afar)
-    if not afar and by_halves > config.CLOSE * config.FAR_APART * variance:
-        by_halves = variance_of_halves(posterior, values, line)
-    if by_halves < config.FAR_APART * variance:
-        return np.zeros((4, 4))
-    return (by_halves - variance) * np.outer(line, line)
 
 
 def _estimate_of(
@@ -192,7 +155,6 @@ def _estimate_of(
     odds: Array,
     values: Array,
     covariance: Array,
-    extra: Array,
     fits: Array,
     joint: JointEstimate,
     prior: CameraPose,
@@ -221,7 +183,7 @@ def _estimate_of(
         prior_loss=loss(
             best.posterior.walkers, best.posterior.paths, best.candidate, array_of(prior)
         ),
-        neighbourhood=PathNeighbourhood(speeds=best.speeds.warm_start, extra_covariance=extra),
+        speeds=best.speeds.warm_start,
     )
 
 

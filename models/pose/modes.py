@@ -104,14 +104,13 @@ def _climbed(
     warm_start: WarmStart | None,
 ) -> Mode:
     """The mode with the speeds fitted at its heading, and the peak above it."""
-    around = None if warm_start is None else warm_start.neighbourhood
     speeds = joint_at_heading(
         tracks,
         site.prior,
         site.speed_reference,
         mode.candidate,
         joint,
-        None if around is None else around.speeds,
+        None if warm_start is None else warm_start.speeds,
     )
     posterior = replace(mode.posterior, belief=belief_of(speeds, site.prior))
     return Mode(
@@ -155,22 +154,3 @@ def covariance_between(peaks: list[Peak], odds: Array) -> Array:
     """The covariance (4, 4) around the first of some modes by the others, with odds (P,)."""
     away = np.array([parameters_apart(peak.candidate, peaks[0].candidate) for peak in peaks])
     return np.asarray((away * (odds / odds.sum())[:, None]).T @ away)
-
-
-def covariance_beyond_gaussian(mode: Mode, covariance: Array) -> Array:
-    """The covariance (4, 4) that a posterior has which is flatter than at its peak.
-
-    Looked at along the heading, the other parameters following as they do around the peak. Nothing
-    where that would take the camera to no height at all: so little is known then that nothing
-    is added.
-    """
-    line = covariance[:, 3] / covariance[3, 3]
-    sd = math.sqrt(covariance[3, 3])
-    # Of a Gaussian, a sum over places one deviation apart is exact to 1e-8.
-    turns = sd * np.arange(-4.0, 5.0)
-    if abs(turns[-1] * line[2]) > config.LARGEST_LOG_HEIGHT:
-        return np.zeros_like(covariance)
-    values = mode.posterior.values(mode.candidate + turns[:, None] * line)
-    density = np.exp(values - values.max())
-    variance = float(density @ turns**2 / density.sum())
-    return np.asarray(max(variance - sd**2, 0.0) * np.outer(line, line))

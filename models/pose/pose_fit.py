@@ -29,23 +29,6 @@ from models.walking.fit import FitStart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PathNeighbourhood:
-    """The neighbourhood of the only mode, about the same for almost the same tracks.
-
-    `speeds` is where the fit of speeds ended with its heading. `extra_covariance` (4, 4) was added
-    for other modes, for a posterior that is no Gaussian, and for halves of the people that find
-    other headings.
-    """
-
-    speeds: FitStart
-    extra_covariance: Array
-
-    def is_narrow(self, covariance: Array) -> bool:
-        """True if so little of a covariance (4, 4) was added that it need not be computed anew."""
-        return float(self.extra_covariance[3, 3]) < config.NARROW * float(covariance[3, 3])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Rival:
     """Another pose (4,) that explains the tracks: its weight, among all that do."""
 
@@ -64,7 +47,8 @@ class FusedEstimate:
     (4,) are where the search ended, the best first: `raw`, and what may have to do with the
     covariance. `path_fit` is the sum over walking groups of how well they fit the paths at `raw`,
     in logs, and `prior_loss` how much worse they do at the prior pose, in standard errors;
-    `prior_gap` is twice what the log posterior is lower there.
+    `prior_gap` is twice what the log posterior is lower there. `speeds` is where the fit of
+    speeds ended with the heading.
     """
 
     values: Array
@@ -77,7 +61,7 @@ class FusedEstimate:
     path_fit: float = 0.0
     prior_loss: float = 0.0
     prior_gap: float = math.inf
-    neighbourhood: PathNeighbourhood | None = None
+    speeds: FitStart | None = None
 
     @property
     def registered(self) -> bool:
@@ -146,7 +130,7 @@ def by_speeds_alone(
     )
 
 
-_FORMAT = Format(name="warm_start", version=1)
+_FORMAT = Format(name="warm_start", version=2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,8 +172,8 @@ class WarmStart:
     `joint` is by speeds alone, which determine all that they may; `means` are the coefficients of
     the mixed model's fields there. `fused` is by places too, where they are `registered`: what they
     determine together is `identifiable`, and `reason_code` says what was wrong with the paths.
-    `neighbourhood` is of its mode, where there was a single one. `search` is when all other poses
-    were searched.
+    `speeds` is where their fit ended with its heading, where there was a single mode. `search` is
+    when all other poses were searched.
     """
 
     prior: CameraPose
@@ -200,7 +184,7 @@ class WarmStart:
     identifiable: tuple[str, ...]
     reason_code: str | None
     search: FullSearch
-    neighbourhood: PathNeighbourhood | None = None
+    speeds: FitStart | None = None
 
     @property
     def speed_starts(self) -> tuple[FitStart, ...]:
@@ -254,7 +238,7 @@ def warm_start_of(found: PoseFit, prior: CameraPose, search: FullSearch) -> Warm
         identifiable=fused.identifiable,
         reason_code=_code(fused),
         search=search,
-        neighbourhood=fused.neighbourhood if len(fused.modes) == 1 else None,
+        speeds=fused.speeds if len(fused.modes) == 1 else None,
     )
 
 

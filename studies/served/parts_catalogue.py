@@ -151,27 +151,6 @@ PARTS: dict[str, Part] = {
         source=("models.paths.path_tests:UsualFit.has_changed",),
         faults=_FEW_AND_FAR,
     ),
-    "seen ground": Part(
-        words="no heading is identifiable on ground that the reference never saw",
-        off=(("models.pose.fusion:on_seen_ground", lambda *_: True),),
-        source=("models.paths.registration:on_seen_ground",),
-        faults=_FEW_AND_FAR,
-    ),
-    "halves of the people": Part(
-        words="the heading is less sure where halves find it apart",
-        off=(("models.pose.fusion:_covariance_of_halves", _nothing(4)),),
-        source=(
-            "models.pose.fusion:_covariance_of_halves",
-            "models.paths.registration:variance_of_halves",
-        ),
-        faults=_FEW_AND_FAR,
-    ),
-    "flat posterior": Part(
-        words="a posterior flatter than its peak widens the heading",
-        off=(("models.pose.fusion:covariance_beyond_gaussian", _nothing(4)),),
-        source=("models.pose.modes:covariance_beyond_gaussian",),
-        faults=_FEW_AND_FAR,
-    ),
     "Birge ratio": Part(
         words="speeds and places that disagree are less sure",
         off=(("models.pose.fusion:birge_ratio", lambda *_: 1.0),),

@@ -148,24 +148,6 @@ def test_a_warm_start_that_was_stored_is_the_same_start(site, people):
         warm_start_from_bytes(data[:-9])
 
 
-def test_what_was_added_to_a_covariance_is_asked_anew_where_it_is_much(site, people):
-    every = observe(people, LENS, PRIOR)
-    last = estimate_pose(of_tracks(every, np.arange(WINDOW)), site).warm_start
-    near = of_tracks(every, np.arange(10, WINDOW + 10))
-    variance = last.fused.covariance[3, 3]
-
-    def added(share):
-        wider = np.diag([0.0, 0.0, 0.0, share * variance])
-        around = replace(last.neighbourhood, extra_covariance=wider)
-        begin = replace(last, neighbourhood=around)
-        found = estimate_pose(near, site, warm_start=begin)
-        assert found.warm_start.search.to_s == last.search.to_s  # no other poses were tried
-        return found.warm_start.neighbourhood.extra_covariance[3, 3] / variance
-
-    assert added(0.05) == pytest.approx(0.05)
-    assert added(0.2) != pytest.approx(0.2)
-
-
 @pytest.mark.skipif(not SCENES.is_dir(), reason="recorded scenes are not at hand")
 @pytest.mark.parametrize("knock", [None, LARGE])
 def test_recorded_people_come_to_the_same(monkeypatch, knock):

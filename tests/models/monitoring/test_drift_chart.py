@@ -27,9 +27,10 @@ from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_gro
 from models.monitoring.verdict import may_be_clock
 from models.paths.folds import fold_maps
 from models.paths.reference import learn_paths
+from models.pose import estimate_pose, learn_site, observe
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import of_tracks
-from models.tracks.trajectory import by_end
+from models.tracks.trajectory import Trajectory, by_end
 from models.tracks.walks import observe_each
 from models.walking.reference_learning import learn_speed_reference
 from studies.simulation.lanes import SiteConfig, draw_lanes, walk_site
@@ -239,6 +240,17 @@ def test_a_still_camera_is_not_taken_for_moved(lanes, learned):
     scores = score_groups(walk(lanes, PRIOR, 900, 7), usual)
     path = trace(ratios_of(chart), chart.bounded(scores.values) - chart.mean)
     assert path.statistic.max() < chart.level(ONE_A_YEAR)
+
+
+def test_of_one_walk_over_and_over_there_is_no_chart():
+    """A video in a loop: nobody differs from anybody, so that chance has no measure."""
+    time_s = 0.5 * np.arange(16)
+    uv = np.column_stack([300 + 64 * time_s, np.full(16, 400.0)])
+    loop = [Trajectory(time_s=60.0 * n + time_s, uv=uv) for n in range(60)]
+    site = learn_site(observe(loop, LENS, PRIOR), LENS, PRIOR)
+    assert site.chart is None
+    found = estimate_pose(observe(loop, LENS, PRIOR), site)
+    assert found.pose.tilt_rad == pytest.approx(PRIOR.tilt_rad, abs=1e-6)
 
 
 def test_people_in_the_rain_are_not_a_knock(lanes, learned):
