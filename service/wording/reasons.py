@@ -269,6 +269,18 @@ def _other_sources(v: _Values) -> str:
     )
 
 
+def _left_out(v: _Values) -> str:
+    names = ", ".join(repr(name) for name in v["track_ids"])
+    if v["tracks"] > len(v["track_ids"]):
+        names += _(" and others")
+    return _n(
+        "{n} of its tracks is not looked at, for a look would take too long of it: {names}",
+        "{n} of its tracks are not looked at, for a look would take too long of them: {names}",
+        v["tracks"],
+        names=names,
+    )
+
+
 # A text takes the values by their names.
 _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     TracksCode.BEYOND_LIMITS: lambda v: _(
@@ -381,12 +393,7 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         waits=v["waits_s"] / 60,
         limit=v["limit_s"] / 60,
     ),
-    ServiceCode.TRACKS_LEFT_OUT: lambda v: _(
-        "{tracks} of its tracks are not looked at, for a look would take too long of them: {names}",
-        names=", ".join(f"{name!r}" for name in v["track_ids"])
-        + (_(" and others") if v["tracks"] > len(v["track_ids"]) else ""),
-        **v,
-    ),
+    ServiceCode.TRACKS_LEFT_OUT: _left_out,
     ServiceCode.DISABLED_BY_PERSON: N_("disabled by a person"),
     ServiceCode.ENDPOINT_GONE: N_("it answered 410: it is gone for good"),
     ServiceCode.ENDPOINT_FAILS: N_("it failed for more than {patience_s_in_h:g} h: {error}"),

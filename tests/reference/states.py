@@ -1,6 +1,7 @@
 """The page of states and reasons, out of the service's vocabularies and codes."""
 
 from enum import StrEnum
+from inspect import cleandoc
 
 from service import enums
 from service.reasons import CODES
@@ -39,7 +40,7 @@ def states_page() -> str:
 
 def _vocabulary(words: type[StrEnum]) -> str:
     said = ", ".join(f"`{word}`" for word in words)
-    return f"**{words.__name__}**. {(words.__doc__ or '').strip()} {said}.\n"
+    return f"**{words.__name__}**. {cleandoc(words.__doc__ or '')} {said}.\n"
 
 
 def _reason(code: str) -> str:

@@ -169,7 +169,7 @@ SAID = [
      "7 of its tracks are not looked at, for a look would take too long of them: '17', \"it's\" "
      "and others"),
     (S.TRACKS_LEFT_OUT, {"tracks": 1, "track_ids": ["17"], "share": 0.25},
-     "1 of its tracks are not looked at, for a look would take too long of them: '17'"),
+     "1 of its tracks is not looked at, for a look would take too long of it: '17'"),
     (S.DISABLED_BY_PERSON, {}, "disabled by a person"),
     (S.ENDPOINT_GONE, {}, "it answered 410: it is gone for good"),
     (S.ENDPOINT_FAILS, {"patience_s": 259200.0, "error": "answered 500"},
