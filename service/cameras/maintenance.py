@@ -56,7 +56,7 @@ def open_window(
     session.add(record)
     session.flush()
     _note(session, Activity.MAINTENANCE_PLANNED, record, by)
-    open_ = any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
+    open_ = alerts.pose_doubted(session, camera_id)
     if from_at <= now and not open_:
         forget_streak(session, camera_id)  # an open alert ends by its own rules
     request_estimate(session, queue, camera_id)

@@ -300,7 +300,7 @@ def _is_well(session: Session, settings: Settings, reference: SiteReferenceRecor
         return False
     if last.drift_streak > 0 or last.drifted or last.suspected:
         return False
-    if any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS):
+    if alerts.pose_doubted(session, camera_id):
         return False
     return not is_before(last.to_s, window_of(session, reference, settings))
 

@@ -48,7 +48,7 @@ def last_answer(session: Session, camera_id: str, now: datetime) -> ActivityReco
     if entry is None or entry.what not in ANSWERS or now - entry.at > UNDO_WITHIN:
         return None
     before = entry.details.get("before")
-    if before is None or any(alerts.firing(session, camera_id, k) for k in alerts.POSE_KINDS):
+    if before is None or alerts.pose_doubted(session, camera_id):
         return None  # people have told anew
     learned_at = references.map_learned_at(session, before["reference_id"])
     return None if learned_at is not None and learned_at > entry.at else entry

@@ -231,7 +231,7 @@ def _may_have_moved(
         return True  # somebody was at the camera, and nobody knows yet how it stands since
     if last.suspects_move:
         return True
-    if any(alerts.firing(session, reference.camera_id, kind) for kind in alerts.POSE_KINDS):
+    if alerts.pose_doubted(session, reference.camera_id):
         return True
     had_map = kept is not None and kept.data is not None and kept.learned_at <= last.created_at
     if had_map and "registered" not in last.raw:

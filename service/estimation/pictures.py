@@ -77,7 +77,7 @@ def load_picture(session: Session, settings: Settings, camera_id: str) -> NewPic
     if prior.assumed:
         return None
     now = datetime.now(UTC)
-    doubted = any(alerts.firing(session, camera_id, kind) for kind in alerts.POSE_KINDS)
+    doubted = alerts.pose_doubted(session, camera_id)
     attended = references.maintenance_under_way(session, camera_id, now) is not None
     kept = pictures.gallery(session, prior.id)
     ids, gallery = [each.id for each in kept], read_gallery([each.features for each in kept])

@@ -137,12 +137,12 @@ _FIRING = select(AlertRecord).where(
     AlertRecord.state == AlertState.FIRING,
 )
 
-_BY_ESTIMATES = select(AlertRecord.kind).where(
+_ABOUT_POSE = select(AlertRecord.kind).where(
     AlertRecord.camera_id == bindparam("camera"),
     AlertRecord.kind.in_(POSE_KINDS),
     AlertRecord.state == AlertState.FIRING,
-    AlertRecord.source == AlertSource.ESTIMATE,
 )
+_BY_ESTIMATES = _ABOUT_POSE.where(AlertRecord.source == AlertSource.ESTIMATE)
 
 
 def answers_of(kind: AlertKind) -> tuple[Answer, ...]:
@@ -175,6 +175,11 @@ class AlertFilter:
 def firing(session: Session, camera_id: str, kind: AlertKind) -> AlertRecord | None:
     """The open alert of a camera and kind, or None."""
     return session.scalars(_FIRING, {"camera": camera_id, "kind": kind}).first()
+
+
+def pose_doubted(session: Session, camera_id: str) -> bool:
+    """True while an open alert holds a camera against its prior pose."""
+    return session.scalars(_ABOUT_POSE, {"camera": camera_id}).first() is not None
 
 
 def firing_by_estimates(session: Session, camera_id: str) -> set[AlertKind]:
