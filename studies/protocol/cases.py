@@ -140,7 +140,8 @@ def draw_case(
         parting: who is the reference, and who comes after the offset.
         fault: what is wrong with the tracks, before the offset too unless it sets in later.
         heading_rad: the offset of the heading; else it is drawn, too.
-        still_share: the share of those who come after the reference whom the still camera sees.
+        still_share: the share of those who come after the reference whom the still camera sees;
+            who is in the picture while it moves is left out.
     """
     rng = np.random.default_rng(seed)
     parts = part_people(scene, parting, rng)
@@ -163,10 +164,13 @@ def draw_case(
     if parting.seen_tracks is not None:
         later = later[int(begin * max(len(later) - parting.seen_tracks, 0)) :]
     most = len(later) if parting.seen_tracks is None else min(len(later), parting.seen_tracks)
-    before = int(still_share * most)
+    ends = sorted(float(track.trajectory.time_s[-1]) for track in later[:most])
+    moved_s = ends[int(still_share * most) - 1] if still_share * most >= 1 else -math.inf
+    before = [track for track in later[:most] if track.trajectory.time_s[-1] <= moved_s]
+    after = [track for track in later if track.trajectory.time_s[0] > moved_s]
     seen: Sequence[SceneTrack] = [
-        *first_seen(scene, later[:before], unmoved, None),
-        *first_seen(scene, later[before:], moved, most - before),
+        *first_seen(scene, before, unmoved, None),
+        *first_seen(scene, after, moved, most - len(before)),
     ]
     if fault is not None:
         if not fault.later:
