@@ -15,7 +15,8 @@ SEEN_APART = {"alerts", "wall", "login"}
 
 def pages_of(settings):
     """The names of all pages that are of no single camera, but for those that are seen apart."""
-    paths = (route.path for route in create_app(settings).routes if isinstance(route, APIRoute))
+    routes = (route for route in create_app(settings).routes if isinstance(route, APIRoute))
+    paths = (route.path for route in routes if "GET" in route.methods)
     found = {path.removeprefix("/ui/") for path in paths if re.fullmatch("/ui/[a-z]+", path)}
     return sorted(found - SEEN_APART)
 
