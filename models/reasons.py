@@ -38,3 +38,4 @@ class TracksCode(StrEnum):
     STATURE_UNUSUAL = "stature_unusual"
     PRIOR_POSE_DOUBTED = "prior_pose_doubted"
     PIECES = "pieces"
+    SITE_CHANGED = "site_changed"

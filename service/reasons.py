@@ -36,7 +36,6 @@ class ServiceCode(StrEnum):
     TRACKS_LEFT_OUT = "tracks_left_out"
     BY_PICTURE = "by_picture"
     PICTURE_SHIFTED = "picture_shifted"
-    SITE_CHANGED = "site_changed"
     PICTURE_FROZEN = "picture_frozen"
     PICTURE_BLACK = "picture_black"
     PICTURE_BLINDED = "picture_blinded"

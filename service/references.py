@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from models.durations import DAY_S
-from models.monitoring.verdict import DriftLimits
+from models.monitoring.drift import DriftLimits
 from service.enums import Answer, Origin, Outcome
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks

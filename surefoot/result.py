@@ -3,27 +3,23 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 
-from models.durations import DAY_S
-from models.errors import TooFewTrajectoriesError
+from models.assessment import Assessment, AssessmentLimits, TrackWindow, assess, tracks_a_year
 from models.geometry.pose import PARAMETERS
-from models.monitoring.chart import CLOCK, ChartResult
-from models.monitoring.verdict import Drift, DriftLimits, judge
-from models.pose import (
-    AlarmRate,
-    PosePosterior,
-    alarm_chart_result,
-    estimate_pose,
-    observe,
-    since_alarm,
-)
-from models.walking.config import FEWEST_WALKERS
+from models.monitoring.chart import CLOCK
+from models.monitoring.drift import Drift
+from models.pose import PosePosterior
+from models.reasons import TracksCode
 from surefoot.camera import Pose
 from surefoot.site import Site
 from surefoot.tracks import Track, in_order
 
-_LIMITS = DriftLimits()
-_YEAR_S = 365.25 * DAY_S
+_CAUSES: dict[StrEnum, str] = {
+    TracksCode.SCALE_CHANGED: "clock",
+    TracksCode.CHART: "clock",
+    TracksCode.LENS_CHANGED: "lens",
+}
 _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
 
 
@@ -31,12 +27,16 @@ _UNITS = {"tilt": "deg", "roll": "deg", "heading": "deg", "height": "m"}
 class Result:
     """The pose of tracks beside the prior pose.
 
-    `moved` is what an alert would say, `probability` how likely it is by the pose alone.
-    `estimated` names the numbers that the tracks determine; the others are the prior pose's.
-    `sd` and `drift` (pose less prior pose) are of those. `posterior` is over what moved.
+    `moved` is whether the service would raise a `drift` alert, `state` its state of the camera
+    (learning, ok, suspected, unsure or drifting), `cause` is `clock` or `lens` if one of these is
+    wrong instead. `probability` is that of a move by the pose alone. `estimated` names the numbers
+    that the tracks determine; the others are the prior pose's. `sd` and `drift` (pose less prior
+    pose) are of those. `posterior` is over what moved.
     """
 
     moved: bool
+    state: str
+    cause: str | None
     probability: float
     why: str
     pose: Pose
@@ -84,21 +84,20 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
         TooFewTrajectoriesError: fewer than 5 people walk.
     """
     model, ordered = site.model, in_order(tracks)
-    observed = observe(ordered, model.intrinsics, model.prior)
-    if observed.walkers < FEWEST_WALKERS:
-        raise TooFewTrajectoriesError(
-            f"tracks: at least {FEWEST_WALKERS} people who walk are needed, got {observed.walkers}"
-        )
-    found = estimate_pose(observed, model)
-    chart = alarm_chart_result(observed, model, _rate(ordered, alarms_a_year), first=found.first)
-    found = since_alarm(found, observed, model, chart)
-    verdict = judge(found.drift, _LIMITS, (), chart)
-    known = {name: _in_unit(name, found.drift) for name in found.drift.identifiable}
+    found = assess(
+        TrackWindow(trajectories=ordered),
+        model,
+        limits=AssessmentLimits(alarms_a_year=alarms_a_year, tracks_a_year=tracks_a_year(ordered)),
+    )
+    drift, cause = found.drift, found.decision.cause
+    known = {name: _in_unit(name, drift) for name in drift.identifiable}
     return Result(
-        moved=verdict.drifting,
+        moved=found.decision.verdict.drifting and cause is None,
+        state=str(found.state),
+        cause=None if cause is None else _CAUSES[cause.code],
         probability=found.posterior.moved,
-        why=_why(found.drift, chart),
-        pose=Pose.of(found.pose),
+        why=_why(found),
+        pose=Pose.of(found.estimated.pose),
         estimated=tuple(_field(name) for name in known),
         sd={_field(name): sd for name, (_, sd) in known.items()},
         drift={_field(name): by for name, (by, _) in known.items()},
@@ -106,19 +105,9 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     )
 
 
-def _rate(tracks: Sequence[Track], alarms_a_year: float) -> AlarmRate:
-    """The rate of false alarms, for people who come as often as these did."""
-    span_s = max(float(tracks[-1].time_s[-1] - tracks[0].time_s[-1]), 1.0) if tracks else 1.0
-    return AlarmRate(
-        alarms_a_year=alarms_a_year,
-        tracks_a_year=max(len(tracks), 1) * _YEAR_S / span_s,
-        calm_ratio=_LIMITS.clear_ratio,
-        calm_groups=_LIMITS.people,
-    )
-
-
-def _why(drift: Drift, chart: ChartResult | None) -> str:
-    """The drift in words: each number with its standard deviation, and what the chart says."""
+def _why(found: Assessment) -> str:
+    """The drift in words: each number with its standard deviation, and the chart's result."""
+    drift, chart = found.drift, found.chart
     known = {name: _in_unit(name, drift) for name in drift.identifiable}
     parts = [f"{n} {by:+.2f} {_UNITS[n]} (sd {sd:.2f})" for n, (by, sd) in known.items()]
     words = ", ".join(parts) if parts else "the tracks determine no number of the pose"

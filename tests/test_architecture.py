@@ -63,7 +63,7 @@ PUBLIC_MODELS = {
     "models.geometry.upright": "upper edges of boxes, as they are stored",
     "models.geometry.usual_pose": "the pose of a camera that nobody has calibrated",
     "models.monitoring.arrivals": "rhythms of people, and silences",
-    "models.monitoring.verdict": "the drift and its limits, without what estimates it",
+    "models.monitoring.drift": "the drift and its limits, without what estimates it",
     "models.pictures": "the turn between two pictures, a gallery, what is wrong with one",
     "models.pose": "a site, an estimate, an alarm: all that they take, give and keep",
     "models.quantiles": "the 90 % interval, for words",

@@ -1,31 +1,17 @@
-"""Learn a site, estimate a pose, read the alarm chart: recalibration, values in and values out.
-
-All that these three take and give can be imported from here, and what keeps it as bytes.
-"""
+"""Learn a site and estimate a pose: values in, values out, and their form as bytes."""
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.chart import CLOCK, ChartResult, chart_from_bytes, chart_to_bytes
-from models.monitoring.config import CREEP_SHARE
 from models.monitoring.creep import (
     Creep,
     CreepLog,
     creep_log_from_bytes,
     creep_log_to_bytes,
-    creep_result,
 )
-from models.monitoring.verdict import Drift, DriftLimits
+from models.monitoring.drift import Drift, DriftLimits
 from models.paths.reference import paths_from_bytes, paths_to_bytes
-from models.pose.alarms import (
-    AlarmRate,
-    alarm_chart_result,
-    begin_creep_log,
-    log_creep,
-    raised_by_creep,
-    since_alarm,
-    without_creep,
-)
-from models.pose.causes import Cause, reason_of_causes
+from models.pose.causes import Cause
 from models.pose.config import FEWEST_BESIDE
 from models.pose.estimating import (
     PartialFailure,
@@ -44,8 +30,7 @@ from models.pose.pose_fit import (
 )
 from models.pose.power import PEOPLE, smallest_told
 from models.pose.self_calibration import SelfCalibration, self_calibrate
-from models.pose.site import CameraSite, assume_site, learn_site
-from models.pose.states import WindowState, is_site_changed, state_of
+from models.pose.site import Baseline, CameraSite, assume_site, learn_site
 from models.simulation.walkers import WalkConfig
 from models.tracks.linking import count_walks, link_pieces
 from models.tracks.observations import Observations
@@ -56,7 +41,6 @@ from models.walking.speed_reference import SpeedReference, reference_from_bytes,
 
 __all__ = [
     "CLOCK",
-    "CREEP_SHARE",
     "FEWEST_BESIDE",
     "JointEstimate",
     "SpeedReference",
@@ -68,8 +52,8 @@ __all__ = [
     "paths_to_bytes",
     "reference_from_bytes",
     "reference_to_bytes",
-    "AlarmRate",
     "CameraPose",
+    "Baseline",
     "CameraSite",
     "Creep",
     "CreepLog",
@@ -90,33 +74,22 @@ __all__ = [
     "Walks",
     "WarmStart",
     "Cause",
-    "reason_of_causes",
     "assume_site",
-    "begin_creep_log",
     "count_walks",
     "drift_of",
     "estimate_pose",
     "learn_site",
     "link_pieces",
-    "log_creep",
     "observe",
     "pose_posterior",
-    "raised_by_creep",
     "Hypothesis",
     "PEOPLE",
     "Rival",
     "SelfCalibration",
     "self_calibrate",
-    "since_alarm",
     "smallest_told",
-    "is_site_changed",
-    "state_of",
-    "WindowState",
     "observe_walks",
-    "alarm_chart_result",
-    "creep_result",
     "warm_start_from_bytes",
     "warm_start_to_bytes",
     "unless_failed",
-    "without_creep",
 ]

@@ -18,14 +18,12 @@ from models.geometry.pose import array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import CLOCK
 from models.monitoring.config import HABITS_OF_DAYS
-from models.monitoring.verdict import LIKELY, reason_of_scale
 from models.paths.likelihood import Walkers, walkers_of
 from models.paths.reference import PathReference
 from models.pose import config
 from models.pose.hypotheses import PosePosterior, degrees_of_freedom, log_tail, times_chance
 from models.pose.pose_fit import FusedEstimate
 from models.pose.site import CameraSite
-from models.reasons import Reason, TracksCode
 from models.tracks.observations import Observations, Steps
 from models.walking.config import FEWEST_GROUPS
 from models.walking.estimate import JointEstimate
@@ -153,31 +151,6 @@ def likeliest_causes(
             factor=math.exp(LENS_LOGS[by_lens]),
         ),
     )
-
-
-def reason_of_causes(
-    causes: tuple[Cause, Cause] | None,
-    moved: float,
-    certainty: float,
-    frame_rate_hz: float | None,
-    drifted: tuple[str, ...] = (),
-) -> Reason | None:
-    """The reason of a wrong clock or lens; None where a move, or nothing, explains as much.
-
-    `moved` is how likely the camera did, whatever the cause: of a change that is certain, the name
-    need not be as certain. One that was told, as a drift in height alone, lasts while it is
-    likelier wrong than not.
-    """
-    if causes is None:
-        return None
-    certainty = LIKELY if drifted == ("height",) else certainty
-    clock, lens = causes
-    wanted = min(config.CAUSE_NAMED, certainty) if moved >= certainty else certainty
-    if max(clock.probability, lens.probability) < wanted:
-        return None
-    if clock.probability >= lens.probability:
-        return reason_of_scale(clock.factor, frame_rate_hz)
-    return Reason(code=TracksCode.LENS_CHANGED, values={"factor": lens.factor})
 
 
 def _pace_evidence(gains: Array, degrees: float) -> float:

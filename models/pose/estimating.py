@@ -11,15 +11,15 @@ from typing import TypeVar
 import numpy as np
 
 from models.geometry.pose import CameraPose
-from models.monitoring.verdict import Drift, pose_after
+from models.monitoring.drift import Drift, pose_after
 from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
 from models.pose import config
 from models.pose.causes import Cause, CauseGains, cause_gains, likeliest_causes
 from models.pose.change_point import find_change, moved_beyond_doubt, suspicion, widened
+from models.pose.factors import Factor
 from models.pose.fusion import fused_estimate
 from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
-from models.pose.picture import PictureEvidence, with_picture
 from models.pose.pose_fit import (
     FullSearch,
     FusedEstimate,
@@ -51,8 +51,8 @@ class PoseFinding:
     change, None where there was none, and `first` the first that counts. `failures` are of what is
     beside. `warm_start` is where the next estimate may begin; None where it has to search all
     poses. `moved_prior` is how likely it was, before any track, that the camera has moved.
-    `picture` is what a picture says beside the people, where there is one that matched. `gains` are
-    what other causes than a move explain; None where nothing looks like one.
+    `factors` are evidence beside the tracks. `gains` are what other causes than a move explain;
+    None where nothing looks like one.
     """
 
     prior: CameraPose
@@ -63,15 +63,17 @@ class PoseFinding:
     failures: tuple[PartialFailure, ...] = ()
     warm_start: WarmStart | None = None
     moved_prior: float = config.MOVED_PRIOR
-    picture: PictureEvidence | None = None
+    factors: tuple[Factor, ...] = ()
     gains: CauseGains | None = None
 
     @cached_property
     def posterior(self) -> PosePosterior:
         """The posterior over what moved."""
         groups, moved_prior = self.joint.walking_groups, self.moved_prior
-        people = pose_posterior(self.fused, groups, self.prior, moved_prior)
-        return people if self.picture is None else with_picture(people, self.picture, moved_prior)
+        posterior = pose_posterior(self.fused, groups, self.prior, moved_prior)
+        for factor in self.factors:
+            posterior = factor.updated(posterior, moved_prior)
+        return posterior
 
     @cached_property
     def causes(self) -> tuple[Cause, Cause] | None:
@@ -100,8 +102,7 @@ def estimate_pose(
     site: CameraSite,
     warm_start: WarmStart | None = None,
     *,
-    picture: PictureEvidence | None = None,
-    told: bool = False,
+    alerted: bool = False,
 ) -> PoseFinding:
     """The pose that explains tracks best, from the newest change of the camera on.
 
@@ -111,7 +112,7 @@ def estimate_pose(
     `warm_start` is of the finding of almost the same tracks at the same site: where nothing speaks
     against it, its pose is refined, which takes a quarter to a half of the time and comes to the
     same. Other causes than a move are asked for where all poses were searched, where a move is not
-    unlikely, and where a change was `told` before.
+    unlikely, and where an alert reports a change (`alerted`).
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
@@ -121,7 +122,7 @@ def estimate_pose(
     if not site.learned:
         joint = joint_estimate(tracks, prior, site.speed_reference)
         fused = by_speeds_alone(joint, prior)
-        return PoseFinding(prior=prior, joint=joint, fused=fused, picture=picture)
+        return PoseFinding(prior=prior, joint=joint, fused=fused)
     failures: list[PartialFailure] = []
     found = None
     if site.paths is not None:
@@ -138,10 +139,9 @@ def estimate_pose(
         first=found.first,
         failures=tuple(failures),
         warm_start=None if failures else found.warm_start,
-        picture=picture,
     )
     refined = warm_start is not None and found.searched_before(warm_start)
-    if refined and not told and finding.posterior.moved < config.CAUSE_MOVED:
+    if refined and not alerted and finding.posterior.moved < config.CAUSE_MOVED:
         return finding
     ask = partial(cause_gains, found.tracks, site, finding.joint, finding.fused)
     gains = unless_failed(failures, "causes", ask)

@@ -26,7 +26,7 @@ from models.geometry.pose import (
     parameters_apart,
 )
 from models.geometry.rotation import Array, Mask
-from models.monitoring.verdict import Drift, MoveProbabilities, drift_between
+from models.monitoring.drift import Drift, MoveProbabilities, drift_between
 from models.pose import config
 from models.pose.pose_fit import FusedEstimate
 from models.walking.config import FEWEST_GROUPS

@@ -66,6 +66,15 @@ class PictureEvidence:
         by = np.array([math.remainder(float(angle), 2 * math.pi) for angle in by])
         return cls(offset=by, covariance=covariance)
 
+    @property
+    def name(self) -> str:
+        """Name of this factor."""
+        return "image"
+
+    def updated(self, posterior: PosePosterior, moved_prior: float) -> PosePosterior:
+        """The posterior over what moved by the tracks and this image."""
+        return with_picture(posterior, self, moved_prior)
+
     def log_density(self, means: Array, covariances: Array) -> Array:
         """Log densities (K,) of what it says, of a camera that turned about so far.
 

@@ -130,7 +130,7 @@ def by_speeds_alone(
     )
 
 
-_FORMAT = Format(name="warm_start", version=2)
+_FORMAT = Format(name="warm_start", version=3)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,7 +173,9 @@ class WarmStart:
     the mixed model's fields there. `fused` is by places too, where they are `registered`: what they
     determine together is `identifiable`, and `reason_code` says what was wrong with the paths.
     `speeds` is where their fit ended with its heading, where there was a single mode. `search` is
-    when all other poses were searched.
+    when all other poses were searched. `charted` and `drifts_slowly` are whether the drift chart
+    was suspicious, and whether the first map was in use: the next estimate may begin here on the
+    same basis alone.
     """
 
     prior: CameraPose
@@ -185,6 +187,8 @@ class WarmStart:
     reason_code: str | None
     search: FullSearch
     speeds: FitStart | None = None
+    charted: bool = False
+    drifts_slowly: bool = False
 
     @property
     def speed_starts(self) -> tuple[FitStart, ...]:

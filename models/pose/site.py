@@ -9,6 +9,7 @@ from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import DriftChart
 from models.monitoring.chart_learning import learn_chart
+from models.monitoring.creep import CreepLog
 from models.monitoring.group_scores import Usual
 from models.paths.folds import ChosenBandwidths, fold_maps
 from models.paths.reference import PathReference, learn_paths
@@ -19,11 +20,26 @@ from models.walking.speed_reference import SpeedReference, assumed_speed_referen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Baseline:
+    """The first map and chart of a reference, which never grow, and whole days scored by them.
+
+    `days` is None before the first whole day. The camera has been stationary since `from_s` but for
+    a slow drift; None means since the reference.
+    """
+
+    paths: PathReference
+    chart: DriftChart
+    days: CreepLog | None = None
+    from_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSite:
     """A camera at its prior pose, and what is known of the people before it.
 
     `speed_reference` is how they walk, learned or assumed. `paths` are where they do and `chart`
-    how their scores scatter; None where too few people walked to learn it.
+    how their scores scatter; None where too few people walked to learn it. `baseline` is the first
+    version of both; None of a site without one.
     """
 
     intrinsics: Intrinsics
@@ -31,6 +47,7 @@ class CameraSite:
     speed_reference: SpeedReference
     paths: PathReference | None = None
     chart: DriftChart | None = None
+    baseline: Baseline | None = None
 
     @property
     def learned(self) -> bool:

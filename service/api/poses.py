@@ -10,7 +10,7 @@ from fastapi.responses import PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 from sqlalchemy.orm import Session
 
-from models.monitoring.verdict import Drift
+from models.monitoring.drift import Drift
 from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import (
     AppState,

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from models.monitoring.verdict import Drift
+from models.monitoring.drift import Drift
 from service.alerts.data_gaps import is_no_data
 from service.enums import AlertSource, Cause, Origin, PoseState, Severity
 from service.references import Attendance, attendance_by, made_against

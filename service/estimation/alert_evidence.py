@@ -8,28 +8,29 @@ import numpy as np
 
 from models.geometry.pose import FIELDS, PARAMETERS, CameraPose, PoseParameters, array_of
 from models.geometry.rotation import Array
-from models.pose import PEOPLE, Hypothesis, PosePosterior
-from service.estimation.finding import Finding
+from models.pose import PEOPLE, FusedEstimate, Hypothesis, PosePosterior
+from service.estimation.compute import ComputedEstimate
 from service.estimation.moved_zones import MovedZones
 
 _HYPOTHESES = 8
 
 
-def alert_evidence(finding: Finding, prior: CameraPose) -> dict[str, Any]:
-    """All that the verdict on a finding hangs on; angles in radians."""
-    fused, chart, creep = finding.fused, finding.reading, finding.creep
+def alert_evidence(found: ComputedEstimate, prior: CameraPose) -> dict[str, Any]:
+    """The numbers behind a verdict; angles in radians."""
+    assessment = found.assessment
+    joint, fused = assessment.estimated.joint, assessment.estimated.fused
     return {
-        **told_by(finding.posterior, fused.values - array_of(prior), finding.zones),
-        "tracks": len(finding.tracks),
-        "walking_groups": finding.joint.walking_groups,
-        "from_s": finding.tracks[0].started_s,
-        "to_s": finding.tracks[-1].ended_s,
+        **told_by(assessment.posterior, fused.values - array_of(prior), found.zones),
+        "tracks": len(found.tracks),
+        "walking_groups": joint.walking_groups,
+        "from_s": found.tracks[0].started_s,
+        "to_s": found.tracks[-1].ended_s,
         "offset_sd": asdict(PoseParameters.sd_of_array(fused.covariance, prior.height_m)),
         "registered": fused.registered,
         "prior_loss_sd": fused.prior_loss,
-        "rivals": rivals_of(finding),
-        "chart": _picked(chart, "statistic", "level", "walking_groups"),
-        "creep": _picked(creep, "statistic", "level"),
+        "rivals": rivals_of(fused),
+        "chart": _picked(assessment.chart, "statistic", "level", "walking_groups"),
+        "creep": _picked(assessment.slow_drift, "statistic", "level"),
     }
 
 
@@ -56,11 +57,11 @@ def _picked(result: object | None, *names: str) -> dict[str, Any] | None:
     return None if result is None else {name: getattr(result, name) for name in names}
 
 
-def rivals_of(finding: Finding) -> list[dict[str, Any]]:
+def rivals_of(fused: FusedEstimate) -> list[dict[str, Any]]:
     """Other poses that explain the tracks, each with its weight among all that do."""
     return [
         {**asdict(PoseParameters.of_array(rival.values)), "weight": rival.weight}
-        for rival in finding.fused.rivals
+        for rival in fused.rivals
     ]
 
 

@@ -6,20 +6,16 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
+from models.assessment import begin_creep_log, log_creep
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.pose import (
-    CREEP_SHARE,
     CameraSite,
-    Creep,
-    begin_creep_log,
     chart_from_bytes,
     chart_to_bytes,
     creep_log_from_bytes,
     creep_log_to_bytes,
-    creep_result,
-    log_creep,
     observe,
     paths_from_bytes,
     paths_to_bytes,
@@ -160,15 +156,3 @@ def first_site(site: CameraSite, anchor: Anchor) -> CameraSite:
     """
     kept = anchor.record
     return replace(site, paths=paths_from_bytes(kept.flow), chart=chart_from_bytes(kept.chart))
-
-
-def creep_of(anchor: Anchor | None, false_alarms_per_year: float) -> Creep | None:
-    """An anchor's creep by its share of the allowed false alarms; None where it has no log.
-
-    Raises:
-        CheckpointError: what is stored cannot be read.
-    """
-    if anchor is None or anchor.record.creep is None:
-        return None
-    log = creep_log_from_bytes(anchor.record.creep)
-    return creep_result(log, CREEP_SHARE * false_alarms_per_year, anchor.from_s)

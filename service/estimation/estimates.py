@@ -1,69 +1,71 @@
-"""What comes of a finding, in one transaction: an estimate, its alerts, training and event."""
+"""The last step of an estimate, in one transaction: its record, alerts, training and event."""
 
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy.orm import Session
 
-from models.geometry.pose import PLANE_PARAMETERS, PoseParameters
-from models.monitoring.verdict import Drift, pose_after
-from models.pose import PosePosterior, drift_of
+from models.assessment import NO_TIME, Assessment, CameraState, Decision, TimeSpan, change_of
+from models.geometry.pose import PoseParameters
+from models.monitoring.drift import LIKELY, Drift, pose_after
+from models.pose import PosePosterior
 from models.reasons import Reason, TracksCode
 from service.alerts.alerts import end_alert, open_alert
 from service.degrees import in_degrees
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
+from service.estimate_queue import request_estimate
 from service.estimation.alert_evidence import alert_evidence, rivals_of, would_notice
+from service.estimation.carried_state import carried_state, last_estimate
+from service.estimation.compute import ComputedEstimate
 from service.estimation.evidence import Evidence
-from service.estimation.finding import Finding
-from service.estimation.judgement import Case, History, Judgement
 from service.job_queue import JobQueue
-from service.reasons import ServiceCode
-from service.references import is_before, made_against, window_of
+from service.reasons import Reasons, ServiceCode
+from service.references import is_before, window_of
 from service.settings import Settings
-from service.store import alerts, estimates, journal, pictures, references
-from service.store.alerts import MOVED_KINDS, SCALE_KINDS
+from service.store import alerts, journal, pictures, references
+from service.store.alerts import SCALE_KINDS
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
 from service.store.references import LastPoseRecord, SiteReferenceRecord
 from service.training import train_at_edge
 from service.wording.alerts import fired_as
+from service.wording.times import from_seconds
 
 
 def save_estimate(
-    session: Session, queue: JobQueue, settings: Settings, evidence: Evidence, finding: Finding
+    session: Session,
+    queue: JobQueue,
+    settings: Settings,
+    evidence: Evidence,
+    found: ComputedEstimate,
 ) -> EstimateRecord | None:
-    """Judge a finding and store what comes of it; None if its reference no longer counts.
+    """Store an estimate and what follows from it; None if it no longer applies.
 
-    A reference that has become ready, or another one that has begun, has a job of its own. So has
-    what comes after a person has answered or was at the camera.
+    It does not if its reference was replaced or became ready, or if an operator acted while it was
+    computed: each of these has a run of its own.
     """
     reference = _counting_reference(session, settings, evidence)
     camera = session.get(CameraRecord, evidence.camera_id)
     if reference is None or camera is None:
         return None
-    drift = drift_of(finding.posterior, finding.fused)
+    assessment = found.assessment
     if evidence.site is None:
-        record = _learning(settings, reference, evidence, finding, drift)
+        record = _learning(settings, reference, evidence, found)
+    elif carried_state(session, reference) != evidence.state:
+        request_estimate(session, queue, camera.id)
+        return None
     else:
-        _note_change(reference, evidence, finding)
-        history = history_of(session, reference)
-        _note_agreement(session, history, finding, camera.id)
-        judgement = Case(
-            reference=reference,
-            history=history,
-            evidence=evidence,
-            finding=finding,
-            drift=drift,
-            frame_rate_hz=camera.frame_rate_hz,
-        ).judged()
-        record = _record(reference, evidence, finding, drift, judgement)
+        _note_change(reference, evidence, assessment)
+        _note_agreement(session, reference, evidence, assessment)
+        record = _record(reference, evidence, found, assessment.decision, found.reasons)
+        drift = assessment.drift
         pose = pose_after(drift, evidence.prior)
         train_at_edge(session, queue, settings, camera.id, pose, drift.identifiable)
-        kept = alert_evidence(finding, evidence.prior)
-        update_alerts(session, settings, camera.id, drift, judgement, kept)
+        kept = alert_evidence(found, evidence.prior)
+        update_alerts(session, settings, camera.id, drift, assessment.decision, found.reasons, kept)
     session.add(record)
-    tell_estimate(session, record, drift)
-    _keep_last_pose(session, reference.id, finding.last)
+    tell_estimate(session, record, assessment.drift)
+    _keep_last_pose(session, reference.id, found.last)
     return record
 
 
@@ -86,32 +88,41 @@ def _learning(
     settings: Settings,
     reference: SiteReferenceRecord,
     evidence: Evidence,
-    finding: Finding,
-    drift: Drift,
+    found: ComputedEstimate,
 ) -> EstimateRecord:
-    """The record while a reference is learned: the prior pose is served, and nothing is judged."""
+    """The record while a reference is learned: the prior pose is served, without a verdict."""
     learning = (Reason(code=ServiceCode.LEARNING_REFERENCE),)
-    judgement = Judgement(state=PoseState.LEARNING, reasons=learning)
-    record = _record(reference, evidence, finding, drift, judgement)
+    record = _record(reference, evidence, found, Decision(state=CameraState.LEARNING), learning)
     record.identifiable, record.pose = [], PoseParameters.of_pose(evidence.prior)
     record.moved, record.moved_parameters = settings.moved_prior, {}
     return record
 
 
-def _note_change(reference: SiteReferenceRecord, evidence: Evidence, finding: Finding) -> None:
-    """Have the window begin at a change that was found, between two tracks."""
-    change = finding.change
-    if change is not None:
-        at = evidence.tracks.index(change)
-        reference.window_from_s, reference.changed_s = change.ended_s, change.started_s
-        reference.changed_after_s = evidence.tracks[at - 1].ended_s if at else None
+def _note_change(
+    reference: SiteReferenceRecord, evidence: Evidence, assessment: Assessment
+) -> None:
+    """Begin the window at a change that was found, between two tracks."""
+    at, change = (
+        assessment.estimated.change_idx,
+        change_of(assessment.observed, assessment.estimated),
+    )
+    if at is not None and change is not None:
+        reference.window_from_s = evidence.tracks[at].ended_s
+        reference.changed_after_s, reference.changed_s = change
 
 
-def _note_agreement(session: Session, history: History, finding: Finding, camera_id: str) -> None:
-    """Count, once a picture, how people compare with it."""
-    picture, people_moved = finding.picture, finding.people_moved
-    if people_moved is not None and picture and not picture.was_told(history.last):
-        pictures.note_agreement(session, camera_id, people_moved=people_moved)
+def _note_agreement(
+    session: Session,
+    reference: SiteReferenceRecord,
+    evidence: Evidence,
+    assessment: Assessment,
+) -> None:
+    """Count, once for each image, how the tracks compare with it."""
+    picture, by_tracks = evidence.picture, assessment.moved_by_tracks
+    if picture is None or by_tracks is None:
+        return
+    if not picture.was_told(last_estimate(session, reference)):
+        pictures.note_agreement(session, evidence.camera_id, people_moved=by_tracks >= LIKELY)
 
 
 def _keep_last_pose(session: Session, reference_id: int, found: LastPoseRecord | None) -> None:
@@ -133,39 +144,25 @@ def tell_estimate(session: Session, record: EstimateRecord, drift: Drift) -> Non
     journal.add_event(session, EventType.POSE, payload, record.created_at)
 
 
-def history_of(session: Session, reference: SiteReferenceRecord) -> History:
-    """The earlier findings of a camera, and what of them counts against its reference."""
-    camera_id = reference.camera_id
-    last = estimates.newest(session, camera_id)
-    if last is not None and not made_against(reference, last):
-        last = None
-    firing = alerts.firing_by_estimates(session, camera_id)
-    unsure = AlertKind.UNSURE in firing
-    if not firing & set(MOVED_KINDS):
-        return History(last=last, drifted=(), unsure=unsure)
-    # An alert of before this reference stands until what is seen after it ends it.
-    before = last or estimates.newest_of_earlier(session, camera_id, reference.id)
-    drifted = () if before is None else tuple(before.drifted)
-    return History(last=last, drifted=drifted or PLANE_PARAMETERS, unsure=unsure)
-
-
 def update_alerts(
     session: Session,
     settings: Settings,
     camera_id: str,
     drift: Drift,
-    judgement: Judgement,
+    decision: Decision,
+    reasons: Reasons,
     evidence: dict[str, Any],
 ) -> None:
-    """Open, update or end the alerts that an estimate stands behind: one of them fires, or none."""
-    firing, verdict = alerts.firing_by_estimates(session, camera_id), judgement.verdict
-    kind, moved = _kind_of(judgement, firing), verdict.drifting
+    """Open, update or end the alerts that estimates raise: at most one of them is open."""
+    firing, verdict = alerts.firing_by_estimates(session, camera_id), decision.verdict
+    kind, moved = _kind_of(decision, firing), verdict.drifting
     note = fired_as(kind) if kind is not None and moved else None
     for before in firing - {kind}:
         end_alert(session, camera_id, before, Outcome.CLEARED, note=note)
     if kind is None or (moved and not drift.identifiable and not verdict.alarmed):
         return
-    cause = judgement.cause if moved else None
+    cause = decision.cause if moved else None
+    after, since = times_of(decision.moved_at if moved else NO_TIME)
     open_alert(
         session,
         settings,
@@ -173,48 +170,57 @@ def update_alerts(
         kind,
         Severity.CRITICAL if moved and verdict.excess >= 2 else Severity.WARNING,
         identifiable_drift(drift),
-        judgement.since if moved else None,
-        reasons=judgement.reasons if cause is None else (cause,),
-        changed_after=judgement.after if moved else None,
-        # Zones are told of with a move alone.
+        since,
+        reasons=reasons if cause is None else (cause,),
+        changed_after=after,
+        # Zones are reported with a move alone.
         evidence=evidence if kind is AlertKind.DRIFT else {**evidence, "zones": None},
     )
 
 
-def _kind_of(judgement: Judgement, firing: set[AlertKind]) -> AlertKind | None:
-    """The kind of the alert that is to fire; None where none is."""
-    verdict = judgement.verdict
+def _kind_of(decision: Decision, firing: set[AlertKind]) -> AlertKind | None:
+    """The kind of the alert that is to be open; None if none is."""
+    verdict = decision.verdict
     if not verdict.drifting:
-        return AlertKind.UNSURE if judgement.state == PoseState.UNSURE else None
-    if judgement.cause is not None:
-        lens = judgement.cause.code == TracksCode.LENS_CHANGED
+        return AlertKind.UNSURE if decision.state == CameraState.UNSURE else None
+    if decision.cause is not None:
+        lens = decision.cause.code == TracksCode.LENS_CHANGED
         return AlertKind.LENS if lens else AlertKind.CLOCK
-    # What was named otherwise stays so until an angle has drifted too.
+    # An alert about a scale keeps its name until an angle has drifted too.
     named = [kind for kind in SCALE_KINDS if kind in firing and verdict.drifted == ("height",)]
     return named[0] if named else AlertKind.DRIFT
+
+
+def times_of(span: TimeSpan) -> tuple[datetime | None, datetime | None]:
+    """A time span as the store keeps it."""
+    after, before = (None if at_s is None else from_seconds(at_s) for at_s in span)
+    return after, before
 
 
 def _record(
     reference: SiteReferenceRecord,
     evidence: Evidence,
-    finding: Finding,
-    drift: Drift,
-    judgement: Judgement,
+    found: ComputedEstimate,
+    decision: Decision,
+    reasons: Reasons,
 ) -> EstimateRecord:
+    assessment = found.assessment
+    chart, fused = assessment.chart, assessment.estimated.fused
     return record_of(
         reference,
-        finding.posterior,
-        drift,
-        judgement,
+        assessment.posterior,
+        assessment.drift,
+        decision,
+        reasons,
         model_id=evidence.model_id,
-        suspected=finding.reading is not None and finding.reading.suspicious,
-        rivals=rivals_of(finding),
-        would_notice=would_notice(finding.power, evidence.prior),
-        raw=_raw(finding),
-        tracks=len(finding.tracks),
-        from_s=min(track.started_s for track in finding.tracks),
-        to_s=finding.tracks[-1].ended_s,
-        newest_track_pk=finding.newest_pk,
+        suspected=chart is not None and chart.suspicious,
+        rivals=rivals_of(fused),
+        would_notice=would_notice(assessment.detectable, evidence.prior),
+        raw=_raw(evidence, found),
+        tracks=len(found.tracks),
+        from_s=min(track.started_s for track in found.tracks),
+        to_s=found.tracks[-1].ended_s,
+        newest_track_pk=found.newest_pk,
     )
 
 
@@ -222,28 +228,30 @@ def record_of(
     reference: SiteReferenceRecord,
     posterior: PosePosterior,
     drift: Drift,
-    judgement: Judgement,
+    decision: Decision,
+    reasons: Reasons,
     **by: Any,
 ) -> EstimateRecord:
-    """The record of a judgement; `by` are the columns that say what it is by."""
+    """The record of a decision; `by` are the columns about its input."""
+    after, since = times_of(decision.moved_at)
     return EstimateRecord(
         camera_id=reference.camera_id,
         prior_pose_id=reference.prior_pose_id,
         reference_id=reference.id,
-        state=judgement.state,
-        reasons=judgement.reasons,
+        state=PoseState(decision.state),
+        reasons=reasons,
         identifiable=list(drift.identifiable),
         pose=PoseParameters.of_pose(pose_after(drift, posterior.prior)),
         pose_sd=drift.sd,
         covariance=posterior.covariance.tolist(),
         drift_by=drift.by,
         drift_angle_rad=drift.angle_rad,
-        drift_streak=judgement.verdict.streak,
-        drifted=list(judgement.verdict.drifted),
+        drift_streak=decision.verdict.streak,
+        drifted=list(decision.verdict.drifted),
         moved=drift.move.moved,
         moved_parameters=dict(drift.move.parameters),
-        drift_after=judgement.after,
-        drift_since=judgement.since,
+        drift_after=after,
+        drift_since=since,
         created_at=_created_at(reference),
         **by,
     )
@@ -257,17 +265,18 @@ def _created_at(reference: SiteReferenceRecord) -> datetime:
     return max(at, reference.answered_at + timedelta(microseconds=1))
 
 
-def _raw(finding: Finding) -> dict[str, Any]:
+def _raw(evidence: Evidence, found: ComputedEstimate) -> dict[str, Any]:
     """Each estimator's own answer."""
-    joint, averaged, registered = finding.joint, finding.averaged, finding.fused.raw_parameters
+    joint, averaged = found.assessment.estimated.joint, found.averaged
+    registered = found.assessment.estimated.fused.raw_parameters
     raw: dict[str, Any] = {"joint": {**_plane(joint.raw_parameters), "tracks": joint.walkers}}
     if registered is not None:
         heading = {"heading_rad": registered.heading_rad, "tracks": joint.walkers}
         raw["registered"] = {**_plane(registered), **heading}
     if averaged is not None:
         raw["averaged"] = {**_plane(averaged.value), "tracks": averaged.tracks}
-    if finding.picture is not None:
-        raw["picture"] = finding.picture.raw
+    if evidence.picture is not None:
+        raw["picture"] = evidence.picture.raw
     return raw
 
 

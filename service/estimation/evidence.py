@@ -1,25 +1,26 @@
 """The input of an estimate, read in one transaction: tracks of so many people, and what else."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 import numpy as np
 import numpy.typing as npt
 from sqlalchemy.orm import Session
 
+from models.assessment import MOST_PIECES, AssessmentState
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.verdict import DriftLimits
+from models.monitoring.drift import DriftLimits
 from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
+from service.estimation.carried_state import carried_state
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows, zones
-from service.store.alerts import MOVED_KINDS
 from service.store.cameras import CameraRecord
 from service.store.look_budget import LookBudget
 from service.store.references import (
@@ -68,7 +69,6 @@ def _named(record: StoredTrack) -> _Track:
 
 _SPARE = 40
 _EXACT_ROUNDS, _LARGE_ROUND = 12, 0.25  # then by a quarter of the people wanted, at least
-MOST_PIECES = 5  # to a walk, on average: more tracks than that are not unpacked for an estimate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,8 +170,8 @@ class Evidence:
     tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
     `moved_prior` is how likely a move is before any track. `before` is the piece before each of the
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
-    estimate before ended, `picture` what the newest picture says. `zones` hang on
-    the pose; `told` is whether an alert says already that it is another one.
+    estimate before ended, `picture` the result of the newest image. `zones` depend on the pose;
+    `state` is what earlier assessments and the operators' answers left.
     """
 
     camera_id: str
@@ -194,7 +194,8 @@ class Evidence:
     last: LastPoseRecord | None = None
     picture: SeenPicture | None = None
     zones: ZonesRecord | None = None
-    told: bool = False
+    frame_rate_hz: float | None = None
+    state: AssessmentState = field(default_factory=AssessmentState)
 
 
 def load_evidence(
@@ -225,7 +226,6 @@ def load_evidence(
     if len(records) < FEWEST_WALKERS or not _is_news(session, reference, model, records, picture):
         return None
     drawn = zones.of_camera(session, camera_id)
-    told = not alerts.firing_by_estimates(session, camera_id).isdisjoint(MOVED_KINDS)
     kept = session.get(FlowMapRecord, reference.id)
     answered_at = alerts.answered_at(session, camera_id)
     seen = [
@@ -261,7 +261,8 @@ def load_evidence(
         last=session.get(LastPoseRecord, reference.id),
         picture=picture,
         zones=drawn,
-        told=told,
+        frame_rate_hz=camera.frame_rate_hz,
+        state=carried_state(session, reference),
     )
 
 

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 import numpy as np
 from sqlalchemy.orm import Session
 
+from models.assessment import without_creep
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -22,7 +23,6 @@ from models.pose import (
     observe,
     paths_from_bytes,
     reference_from_bytes,
-    without_creep,
 )
 from models.tracks.trajectory import Trajectory
 from service.estimation.anchoring import LearnedPaths, keep_paths, paths_of

@@ -1,20 +1,19 @@
 """The estimate by a picture alone: of a camera that nobody has walked by since, or ever."""
 
 import math
-from dataclasses import asdict, replace
-from datetime import datetime
+from dataclasses import asdict
 
 import numpy as np
 from sqlalchemy.orm import Session
 
+from models.assessment import NO_TIME, CameraState, Decision, TimeSpan, judge, reason_of_drift
 from models.geometry.pose import PoseParameters
-from models.monitoring.verdict import LIKELY, judge, pose_after, reason_of_drift
+from models.monitoring.drift import LIKELY, pose_after
 from models.pose import PosePosterior, posterior_by_picture
 from models.reasons import Reason
-from service.enums import PoseState
 from service.estimation.alert_evidence import told_by
-from service.estimation.estimates import history_of, record_of, tell_estimate, update_alerts
-from service.estimation.judgement import Judgement
+from service.estimation.carried_state import carried_state
+from service.estimation.estimates import record_of, tell_estimate, update_alerts
 from service.estimation.moved_zones import MovedZones, moved_zones
 from service.estimation.pictures import drift_by_picture
 from service.estimation.seen_picture import SeenPicture, seen_picture
@@ -41,32 +40,33 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
     prior = cameras.prior_pose(session, camera_id).pose
     posterior = posterior_by_picture(prior, picture.evidence, settings.moved_prior)
     drift, limits = drift_by_picture(posterior), drift_limits(settings)
-    history = history_of(session, reference)
-    drifted = history.drifted
+    carried = carried_state(session, reference)
+    drifted = carried.drifted
     if drifted and last is not None and last.reference_id == reference.id:
         drifted = tuple(last.drifted)  # while it learns, too, by pictures alone
     verdict = judge(drift, limits, drifted)
     if reference.ready_at is None and not verdict.drifting and not drifted:
         return None  # it learns what is usual, and stands
-    state = PoseState.SUSPECTED if posterior.moved >= LIKELY else PoseState.OK
-    taken_at = from_seconds(picture.taken_s)
-    by = Reason(code=ServiceCode.BY_PICTURE, values={"taken_at": json_time(taken_at)})
-    judgement = Judgement(
-        state=PoseState.DRIFTING if verdict.drifting else state,
-        reasons=some(by, reason_of_drift(drift, verdict, limits), picture.reason),
-        verdict=verdict,
-        after=_stood_at(session, camera_id) if verdict.drifting else None,
-        since=taken_at if verdict.drifting else None,
-    )
-    if verdict.drifting and drifted and last is not None:
-        # When it began, as it was told.
-        since = last.drift_since or judgement.since
-        judgement = replace(judgement, after=last.drift_after, since=since)
+    state = CameraState.SUSPECTED if posterior.moved >= LIKELY else CameraState.OK
+    moved_at = NO_TIME
+    if verdict.drifting:
+        state, moved_at = (
+            CameraState.DRIFTING,
+            TimeSpan(_stationary_at_s(session, camera_id), picture.taken_s),
+        )
+        if drifted and last is not None:
+            # A move keeps the time that was reported.
+            moved_at = _reported(last) or TimeSpan(None, moved_at.before_s)
+    decision = Decision(state=state, verdict=verdict, moved_at=moved_at)
+    taken_at = json_time(from_seconds(picture.taken_s))
+    by = Reason(code=ServiceCode.BY_PICTURE, values={"taken_at": taken_at})
+    reasons = some(by, reason_of_drift(drift, verdict, limits), picture.reason)
     record = record_of(
         reference,
         posterior,
         drift,
-        judgement,
+        decision,
+        reasons,
         suspected=False,
         rivals=[],
         would_notice={},
@@ -80,15 +80,24 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
     drawn = zones.of_camera(session, camera_id)
     moved = moved_zones(drawn, lens, pose_after(drift, prior)) if verdict.drifting else None
     evidence = _evidence(posterior, picture, moved)
-    update_alerts(session, settings, camera_id, drift, judgement, evidence)
+    update_alerts(session, settings, camera_id, drift, decision, reasons, evidence)
     session.add(record)
     tell_estimate(session, record, drift)
     return record
 
 
-def _stood_at(session: Session, camera_id: str) -> datetime | None:
+def _stationary_at_s(session: Session, camera_id: str) -> float | None:
+    """When an image last showed the camera at its prior pose."""
     found = session.get(PictureRecord, camera_id)
-    return None if found is None else found.other_at
+    return None if found is None or found.other_at is None else found.other_at.timestamp()
+
+
+def _reported(last: EstimateRecord) -> TimeSpan | None:
+    """The time of the move as the last estimate reported it."""
+    if last.drift_since is None:
+        return None
+    after = last.drift_after
+    return TimeSpan(None if after is None else after.timestamp(), last.drift_since.timestamp())
 
 
 def _evidence(

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import ANGLES, CameraPose
-from models.monitoring.verdict import LIKELY, Drift, drift_between
+from models.monitoring.drift import LIKELY, Drift, drift_between
 from models.pictures import (
     Features,
     PictureFault,

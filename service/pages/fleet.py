@@ -11,7 +11,7 @@ from fastapi.responses import HTMLResponse, JSONResponse
 from markupsafe import Markup
 from sqlalchemy.orm import Session
 
-from models.monitoring.verdict import Drift
+from models.monitoring.drift import Drift
 from service.access.tokens import Caller
 from service.api.middleware.dependencies import AppState, ReadDep, StateDep
 from service.api.middleware.pages import HEADERS, render

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import HTMLResponse
 
 from models.geometry.pose import CameraPose
-from models.monitoring.verdict import pose_after
+from models.monitoring.drift import pose_after
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.api.schemas import Text

@@ -8,7 +8,7 @@ from sqlalchemy import JSON, ColumnElement, Index, bindparam, delete, func, sele
 from sqlalchemy.orm import Mapped, Session, composite, mapped_column
 
 from models.geometry.pose import FIELDS, PoseParameters
-from models.monitoring.verdict import Drift, MoveProbabilities
+from models.monitoring.drift import Drift, MoveProbabilities
 from service.enums import PoseState
 from service.reasons import Reasons
 from service.store.engines.dialects import as_json

@@ -27,7 +27,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Bundle, InstrumentedAttribute, Session, aliased, defer
 
-from models.monitoring.verdict import DriftLimits
+from models.monitoring.drift import DriftLimits
 from service.enums import AlertState, Origin
 from service.store.alerts import AlertRecord
 from service.store.cameras import CameraRecord, PriorPoseRecord, RhythmRecord, newest_of

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from models.monitoring.verdict import Drift
+from models.monitoring.drift import Drift
 from models.reasons import Reason
 from service.enums import AlertKind, AlertState, PoseState, TrainingState
 from service.reasons import ServiceCode

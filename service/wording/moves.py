@@ -7,7 +7,7 @@ from typing import Any
 
 from models.geometry.ground import Misplacement
 from models.geometry.pose import ANGLES, FIELDS, CameraPose, PoseParameters
-from models.monitoring.verdict import Drift
+from models.monitoring.drift import Drift
 from models.quantiles import Z90
 from service.store.estimates import EstimateRecord
 from service.wording.language import N_, _, number

@@ -363,7 +363,7 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         "by a picture of {taken_at}, nobody having walked by since",
         taken_at=_clock(v["taken_at"], v["zone"]),
     ),
-    ServiceCode.SITE_CHANGED: N_(
+    TracksCode.SITE_CHANGED: N_(
         "the picture says that it stands, and people walk elsewhere: the site changed"
     ),
     ServiceCode.PICTURE_SHIFTED: N_(

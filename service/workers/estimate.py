@@ -16,9 +16,9 @@ from service.estimate_queue import (
     note_partial_failures,
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
+from service.estimation.compute import compute_estimate
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Unpacked, load_evidence
-from service.estimation.finding import PartialFailures, compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.learning import (
     compute_reference,
@@ -26,6 +26,7 @@ from service.estimation.learning import (
     save_progress,
     save_reference,
 )
+from service.estimation.partial_failures import PartialFailures
 from service.estimation.picture_estimates import save_by_picture
 from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
@@ -82,14 +83,14 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
     if left_out := left_out_by(budget):
         log.warning("tracks_left_out", extra={"camera_id": camera_id, **left_out[0].values})
         failures.reasons.extend(left_out)
-    finding = None if evidence is None else compute_finding(evidence, settings.seed, failures)
+    found = None if evidence is None else compute_estimate(evidence, settings.seed, failures)
     with store.write(camera_id) as session:
-        if evidence is not None and finding is not None:
-            record = save_estimate(session, context.queue, settings, evidence, finding)
+        if evidence is not None and found is not None:
+            record = save_estimate(session, context.queue, settings, evidence, found)
             _log_estimate(record)
             if record is not None:
                 ask_in_doubt(session, record, evidence.picture)
-        if finding is None or (evidence is not None and evidence.site is None):
+        if found is None or (evidence is not None and evidence.site is None):
             _log_estimate(save_by_picture(session, settings, camera_id))
         cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)

@@ -14,8 +14,8 @@ import numpy as np
 from models.geometry.pose import CameraPose, array_of
 from models.monitoring.chart import trace
 from models.monitoring.chart_learning import drawn_blocks
+from models.monitoring.drift import DriftLimits, judge
 from models.monitoring.group_scores import score_groups
-from models.monitoring.verdict import DriftLimits, judge
 from models.paths.likelihood import walkers_of
 from models.pose import Observations, observe
 from models.simulation.poses import offset_trajectory

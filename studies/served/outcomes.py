@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.assessment import AssessmentLimits, tracks_a_year
 from models.errors import CalibrationError
 from models.geometry.pose import PARAMETERS, CameraPose, array_of
-from models.monitoring.verdict import clock_fault, judge
-from models.pose import CameraSite, DriftLimits, PoseFinding, reason_of_causes, state_of
+from models.pose import CameraSite, PoseFinding
 from studies.protocol.cases import ProtocolCase, angle_deg
-from studies.served.windows import Window, looks
+from studies.served.windows import Window, assessed_windows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,19 +70,16 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
     last, cuts = None, 0
     try:
         if site is not None:
-            for look in looks(case.seen, site, window):
-                last, cuts = look, cuts + (look.cut is not None)
+            limits = AssessmentLimits(tracks_a_year=tracks_a_year(case.seen))
+            for each in assessed_windows(case.seen, site, window, limits):
+                last, cuts = each.assessment, cuts + (each.cut is not None)
             failure = "" if last is not None else "too few people walk"
     except CalibrationError as error:
         failure = f"{type(error).__name__}: {error}"
     if last is None or failure:
         return _unserved(case, failure, time.monotonic() - started)
-    found, served = last.finding, last.finding.pose
-    limits = DriftLimits()
-    cause = reason_of_causes(found.causes, found.posterior.moved, limits.certainty, None)
-    verdict = judge(found.drift, limits, (), scaled=cause is not None)
-    if found.causes is None:
-        cause = clock_fault(found.drift, found.posterior.turned, case.prior_pose, None)
+    found, decision = last.estimated, last.decision
+    served, cause = found.pose, decision.cause
     return ServedOutcome(
         reference_tracks=len(case.reference),
         seen_tracks=len(case.seen),
@@ -94,14 +91,9 @@ def serve_case(case: ProtocolCase, site: CameraSite | None, window: Window) -> S
         mapped=found.fused.registered,
         reason=reason_of(found),
         seconds=time.monotonic() - started,
-        state=state_of(
-            found.posterior,
-            found.fused,
-            drifting=verdict.drifting,
-            mapped=site is not None and site.paths is not None,
-        ),
+        state=decision.state,
         moved=found.posterior.moved,
-        cause="" if cause is None or not verdict.drifting else str(cause.code),
+        cause="" if cause is None or not decision.verdict.drifting else str(cause.code),
     )
 
 

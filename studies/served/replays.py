@@ -5,31 +5,21 @@ As the service would see it with a map that never grows: what is served, what al
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from models.assessment import AssessmentLimits
 from models.durations import DAY_S
 from models.geometry.pose import CameraPose
-from models.monitoring.verdict import judge
-from models.pose import (
-    AlarmRate,
-    CameraSite,
-    DriftLimits,
-    Trajectory,
-    alarm_chart_result,
-    learn_site,
-    observe,
-    reason_of_causes,
-    since_alarm,
-)
+from models.pose import DriftLimits, Trajectory, learn_site, observe
 from models.reasons import TracksCode
 from models.simulation.poses import PoseOffset
 from models.tracks.scenes import Scene, SceneTrack
 from models.tracks.trajectory import by_end
 from studies.protocol.partings import first_seen
 from studies.served.outcomes import ParameterOutcome, parameters_beside, reason_of
-from studies.served.windows import Look, Window, looks
+from studies.served.windows import AssessedWindow, Window, assessed_windows
 
 _YEAR_S = 365.25 * DAY_S
 _MOVED_BETWEEN = (0.2, 0.8)  # of the tracks after the reference
@@ -109,13 +99,15 @@ def replay(
     reference = observe(_in_order(known), scene.intrinsics, prior)
     site = learn_site(reference, scene.intrinsics, prior)
     span_s = max(_start(rest[-1]) - learned_s, 1.0) if rest else 1.0
-    rate = AlarmRate(
-        alarms_a_year=plan.alarms_a_year, tracks_a_year=_YEAR_S * max(len(rest), 1) / span_s
+    limits = AssessmentLimits(
+        drift=plan.limits,
+        alarms_a_year=plan.alarms_a_year,
+        tracks_a_year=_YEAR_S * max(len(rest), 1) / span_s,
     )
-    found = _watch((*stills, *seen), site, plan, rate)
-    one = [look for look in found if look.look.tracks <= len(stills)]
+    found = list(assessed_windows((*stills, *seen), site, plan.window, limits))
+    one = [each for each in found if each.tracks <= len(stills)]
     other = found[len(one) :]
-    measured = next((w for w in other if w.look.tracks >= len(stills) + _MEASURED_AFTER), None)
+    measured = next((w for w in other if w.tracks >= len(stills) + _MEASURED_AFTER), None)
     return ReplayOutcome(
         reference_tracks=len(known),
         charted=site.chart is not None,
@@ -123,58 +115,32 @@ def replay(
         after=_stretch(other, len(stills), len(seen), prior, moved) if knock is not None else None,
         measured=None
         if measured is None
-        else parameters_beside(measured.look.finding, prior, moved),
+        else parameters_beside(measured.assessment.estimated, prior, moved),
         seconds=time.monotonic() - started,
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Watched:
-    """A look, and whether an alarm was on after it."""
-
-    look: Look
-    alarm: bool
-
-
-def _watch(
-    tracks: Sequence[Trajectory], site: CameraSite, plan: ReplayPlan, rate: AlarmRate
-) -> list[_Watched]:
-    """Looks at tracks with their verdicts, each knowing the one before."""
-    found: list[_Watched] = []
-    drifted: tuple[str, ...] = ()
-    for look in looks(tracks, site, plan.window):
-        finding = look.finding
-        result = alarm_chart_result(look.seen, site, rate, first=finding.first)
-        finding = since_alarm(finding, look.seen, site, result)
-        cause = reason_of_causes(
-            finding.causes, finding.posterior.moved, plan.limits.certainty, None, drifted
-        )
-        verdict = judge(finding.drift, plan.limits, drifted, result, scaled=cause is not None)
-        drifted = verdict.drifted
-        found.append(_Watched(look=replace(look, finding=finding), alarm=verdict.drifting))
-    return found
-
-
 def _stretch(
-    watched: Sequence[_Watched], since: int, tracks: int, prior: CameraPose, truth: CameraPose
+    found: Sequence[AssessedWindow], since: int, tracks: int, prior: CameraPose, truth: CameraPose
 ) -> Stretch:
-    parameters = [parameters_beside(each.look.finding, prior, truth) for each in watched]
+    estimated = [each.assessment.estimated for each in found]
+    parameters = [parameters_beside(each, prior, truth) for each in estimated]
     known = [[n.identifiable for n in each] for each in parameters]
     covered = [[n.identifiable and n.covered for n in each] for each in parameters]
-    reasons = [reason_of(each.look.finding) for each in watched]
-    alarms = (each.look.tracks - since for each in watched if each.alarm)
+    reasons = [reason_of(each) for each in estimated]
+    alarms = (each.tracks - since for each in found if each.assessment.decision.verdict.drifting)
     return Stretch(
         tracks=tracks,
-        looks=len(watched),
+        looks=len(found),
         alarm_after=next(alarms, None),
-        mapped=_share([each.look.finding.fused.registered for each in watched]),
+        mapped=_share([each.fused.registered for each in estimated]),
         paths_changed=_share([reason == TracksCode.PATHS_CHANGED for reason in reasons]),
         identifiable=_counts(known),
         covered=_counts(covered),
         worst_sd=max(
             (n.off_sd for each in parameters for n in each if n.identifiable), default=0.0
         ),
-        cuts=sum(each.look.cut is not None for each in watched),
+        cuts=sum(each.cut is not None for each in found),
     )
 
 

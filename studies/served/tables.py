@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from models.pose import WindowState
+from models.assessment import CameraState
 from models.pose.config import MOVED_PRIOR
 from models.reasons import TracksCode
 from studies.faults.catalogue import FAULTS
@@ -278,9 +278,9 @@ def _fault_name(fault: str) -> str:
 
 def _name(outcome: ServedOutcome) -> str:
     """The alert of an outcome, or the state without one."""
-    if outcome.state == WindowState.DRIFTING:
+    if outcome.state == CameraState.DRIFTING:
         return _CAUSES.get(outcome.cause, "drift")
-    return outcome.state or WindowState.LEARNING
+    return outcome.state or CameraState.LEARNING
 
 
 def _reliability_table(cases: _Cases) -> str:
@@ -315,14 +315,13 @@ def _reliability_table(cases: _Cases) -> str:
     return "**Reliability** of `moved`, by the pose alone:\n\n" + "\n".join(lines)
 
 
-# Without pictures none is `site_changed`.
-_STATES = tuple(state for state in WindowState if state != WindowState.SITE_CHANGED)
+_STATES = tuple(CameraState)
 _ENOUGH = 30  # people
 
 
 def _states(outcomes: Sequence[ServedOutcome]) -> list[int]:
     """How many are in each state; what could not be estimated is still `learning`."""
-    said = [outcome.state or WindowState.LEARNING for outcome in outcomes]
+    said = [outcome.state or CameraState.LEARNING for outcome in outcomes]
     return [said.count(state) for state in _STATES]
 
 

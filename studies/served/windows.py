@@ -5,18 +5,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from models.assessment import (
+    Assessment,
+    AssessmentLimits,
+    AssessmentState,
+    TrackWindow,
+    assess,
+    next_state,
+)
 from models.durations import DAY_S
-from models.pose import CameraSite, Observations, PoseFinding, Trajectory, observe
-from models.tracks.observations import of_tracks
-from models.walking.config import FEWEST_WALKERS
-from studies.protocol.served import served_pose
+from models.errors import TooFewTrajectoriesError
+from models.pose import CameraSite, Trajectory
+
+_LIMITS = AssessmentLimits()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Window of an estimate: the newest tracks, of so many days; and how often it is made.
+    """Window of an assessment: the newest tracks, of so many days; and how often it is made.
 
-    After each batch of `batch` tracks; of None, once they all are there.
+    After each batch of `batch` tracks; with None, once they all are there.
     """
 
     tracks: int = 400
@@ -25,35 +33,35 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Look:
-    """An estimate after `tracks` tracks had come: of those from the number `first` on.
+class AssessedWindow:
+    """An assessment after `tracks` tracks had come: of those from the number `first` on.
 
-    `seen` are these, and `cut` the number of the first track after a change that was found.
+    `cut` is the number of the first track after a change that was found.
     """
 
     tracks: int
     first: int
-    seen: Observations
-    finding: PoseFinding
+    assessment: Assessment
     cut: int | None
 
 
-def looks(
+def assessed_windows(
     tracks: Sequence[Trajectory],
     site: CameraSite,
     window: Window,
-) -> Iterator[Look]:
-    """The estimates of tracks that come in the order of their ends, as the service makes them.
+    limits: AssessmentLimits = _LIMITS,
+) -> Iterator[AssessedWindow]:
+    """Assess tracks that come in the order of their ends, as the service does.
 
-    Once a change is found no window reaches back beyond it. Nothing is said of fewer than five
-    people who walk.
+    Once a change is found, no window reaches back beyond it. Windows of fewer than five people who
+    walk are skipped.
 
     Raises:
-        Exception: what a part failed with that the service would have done without.
+        Exception: the error of a part that the service would have done without. In a study it is a
+            fault.
     """
-    every = observe(tracks, site.intrinsics, site.prior)
-    ended_s = every.ended_s
-    from_s = -np.inf
+    ended_s = np.array([track.time_s[-1] for track in tracks])
+    from_s, state = -np.inf, AssessmentState()
     step = window.batch or max(len(tracks), 1)
     for came in [*range(step, len(tracks), step), len(tracks)]:
         if not came:
@@ -61,11 +69,15 @@ def looks(
         oldest_s = max(from_s, float(ended_s[came - 1]) - window.days * DAY_S)
         since = int(np.searchsorted(ended_s[:came], oldest_s, side="left"))
         first = max(since, came - window.tracks)
-        seen = of_tracks(every, np.arange(first, came))
-        if seen.walkers < FEWEST_WALKERS:
+        try:
+            found = assess(TrackWindow(trajectories=tracks[first:came]), site, state, limits)
+        except TooFewTrajectoriesError:
             continue
-        found = served_pose(seen, site)
-        cut = None if found.change_idx is None else first + found.change_idx
+        if found.failures:
+            raise found.failures[0].error
+        state = next_state(state, found)
+        at = found.estimated.change_idx
+        cut = None if at is None else first + at
         if cut is not None:
             from_s = float(ended_s[cut])
-        yield Look(tracks=came, first=first, seen=seen, finding=found, cut=cut)
+        yield AssessedWindow(tracks=came, first=first, assessment=found, cut=cut)

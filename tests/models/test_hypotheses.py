@@ -4,12 +4,12 @@ from itertools import product
 
 import numpy as np
 import pytest
+from models.pose.states import is_noticed
 from scipy.stats import multivariate_t, norm
 
 from models.geometry.pose import PARAMETERS, CameraPose, array_of
 from models.pose import config, drift_of, pose_posterior
 from models.pose.pose_fit import FusedEstimate
-from models.pose.states import is_noticed
 from models.reasons import Reason, TracksCode
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=0.02, heading_rad=2.0)

@@ -9,8 +9,8 @@ import pytest
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.geometry.pose import array_of
 from models.monitoring.chart_learning import learn_chart
+from models.monitoring.drift import judge
 from models.monitoring.group_scores import score_groups
-from models.monitoring.verdict import judge
 from models.paths.folds import fold_maps
 from models.pose import (
     AlarmRate,

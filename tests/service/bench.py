@@ -5,6 +5,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
+from service.estimation.finding import Finding, asked_enough, zones_of
 
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose
 from models.pose import pose_posterior, smallest_told
@@ -14,7 +15,6 @@ from models.regression.recipe import plan_to_config
 from models.walking.estimate import JointEstimate
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
-from service.estimation.finding import Finding, asked_enough, zones_of
 from service.job_queue import JobQueue
 from service.reasons import as_said
 from service.store import journal, references, trainings

@@ -9,8 +9,8 @@ import pytest
 from models.durations import DAY_S
 from models.geometry.ground import ground_from_pixel
 from models.monitoring.chart import OFFSET_GRID, DriftChart, GridOffset, ratios_of
+from models.monitoring.drift import DriftLimits
 from models.monitoring.group_scores import SCORES
-from models.monitoring.verdict import DriftLimits
 from models.tracks.scenes import load_scene
 from studies.alarms.camera_years import live_year
 from studies.alarms.results import (

@@ -22,7 +22,7 @@ from studies.protocol.cases import (
 )
 from studies.protocol.partings import HALVES_IN_TIME
 from studies.served.replay_protocol import boxes_of, tops_carried
-from studies.served.windows import Window, looks
+from studies.served.windows import Window, assessed_windows
 from tests.conftest import SCENES
 
 # Cases in which boxes can say every upper edge that offline knows; the second tells its heading.
@@ -109,13 +109,15 @@ def test_what_is_served_by_time_and_in_batches_is_what_windows_say_offline(servi
     drawn_by = service.settings.seed
     site = learn_site(known, case.intrinsics, case.prior_pose, seed=drawn_by, chart=False)
     seen = [tops_carried(track, case.intrinsics) for track in case.seen]
-    last = list(looks(seen, site, Window(batch=batch)))[-1]
-    drift = last.finding.drift
+    last = list(assessed_windows(seen, site, Window(batch=batch)))[-1]
+    drift = last.assessment.estimated.drift
     body = service.http.get(f"/cameras/{case.scene_id}-knock-2-by-time-{batch}/pose").json()
     for name, field in (("tilt", "tilt_deg"), ("roll", "roll_deg")):
         told = math.degrees(drift.of(name)[0])
         assert body["drift"][field] == pytest.approx(told, abs=1e-3), field
-    assert body["tracks"] == last.seen.tracks - (last.finding.first or 0)
+    assert body["tracks"] == len(last.assessment.observed.ended_s) - (
+        last.assessment.estimated.first or 0
+    )
 
 
 def test_boxes_carry_feet_to_the_bit_and_upper_edges(lens):

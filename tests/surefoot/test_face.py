@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import surefoot
-from models.monitoring.verdict import DriftLimits
+from models.monitoring.drift import DriftLimits
 from service.api.cameras import CameraBody
 from service.settings import Settings
 from studies.simulation.lanes import SiteConfig

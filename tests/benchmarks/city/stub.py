@@ -8,8 +8,9 @@ import sys
 from dataclasses import replace
 from zlib import crc32
 
-from service.estimation.evidence import Evidence
 from service.estimation.finding import Finding
+
+from service.estimation.evidence import Evidence
 from service.workers import estimate
 from tests.service.bench import made_up
 

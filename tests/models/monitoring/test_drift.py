@@ -7,7 +7,7 @@ import pytest
 from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters
 from models.monitoring.chart import ChartResult
 from models.monitoring.creep import Creep
-from models.monitoring.verdict import (
+from models.monitoring.drift import (
     DriftLimits,
     MoveProbabilities,
     clock_fault,

@@ -23,8 +23,8 @@ from models.monitoring.chart import (
 from models.monitoring.chart import chart_result as chart_result_by
 from models.monitoring.chart_learning import drawn_blocks, learn_chart
 from models.monitoring.config import LENGTHS
+from models.monitoring.drift import may_be_clock
 from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_groups
-from models.monitoring.verdict import may_be_clock
 from models.paths.folds import fold_maps
 from models.paths.reference import learn_paths
 from models.pose import estimate_pose, learn_site, observe

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from service.estimation.finding import compute_finding
 from sqlalchemy import delete, select
 
 from models.paths.reference import paths_from_bytes
@@ -19,7 +20,6 @@ from service.estimation import growth
 from service.estimation.anchoring import LearnedPaths
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
-from service.estimation.finding import compute_finding
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.store import alerts, references
 from service.store.estimates import EstimateRecord

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from service.estimation.finding import basis_of, begin_of, compute_finding
 
 from models.pose import warm_start_from_bytes
 from service.estimation.evidence import load_evidence
-from service.estimation.finding import basis_of, begin_of, compute_finding
 from service.store.references import LastPoseRecord
 from tests.service.street import KNOCKED, PRIOR, known_street
 

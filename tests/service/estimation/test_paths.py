@@ -5,10 +5,10 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
+from service.estimation.finding import compute_finding
 
 from models.monitoring.chart import chart_from_bytes
 from service.estimation.evidence import load_evidence
-from service.estimation.finding import compute_finding
 from service.store import references
 from service.store.references import FlowMapRecord
 from tests.service.street import LENS, PRIOR, known_street

@@ -6,6 +6,7 @@ from datetime import datetime
 
 import numpy as np
 import pytest
+from service.estimation.finding import compute_finding
 
 from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import estimate_pose, learn_site
@@ -13,7 +14,6 @@ from models.walking.estimate import joint_estimate
 from models.walking.speed_reference import reference_from_bytes
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Unpacked, load_evidence
-from service.estimation.finding import compute_finding
 from service.store import references
 from service.workers.estimate import learn_if_due
 from tests.conftest import CAMERA, track

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy import event
 
-from models.monitoring.verdict import DriftLimits
+from models.monitoring.drift import DriftLimits
 from service.cameras.poses import view_pose
 from service.pages import fleet as use_cases
 from service.references import drift_limits

@@ -9,7 +9,7 @@ import pytest
 
 from models.geometry.pose import PoseParameters
 from models.monitoring.chart import CLOCK, ChartResult
-from models.monitoring.verdict import (
+from models.monitoring.drift import (
     Drift,
     DriftLimits,
     DriftVerdict,
@@ -133,7 +133,7 @@ SAID = [
      "without the flow map: cannot be read"),
     (S.BY_PICTURE, {"taken_at": "2026-11-25T09:30:00Z"},
      "by a picture of 2026-11-25 09:30Z, nobody having walked by since"),
-    (S.SITE_CHANGED, {},
+    (T.SITE_CHANGED, {},
      "the picture says that it stands, and people walk elsewhere: the site changed"),
     (S.PICTURE_SHIFTED, {},
      "near and far things moved apart in the picture: the camera was moved aside, too, and how far "

@@ -14,7 +14,7 @@ from models.tracks.trajectory import by_end
 from studies.protocol.cases import ProtocolCase
 from studies.served.outcomes import parameters_beside, serve_case
 from studies.served.replays import ReplayPlan, replay
-from studies.served.windows import Window, looks
+from studies.served.windows import Window, assessed_windows
 from studies.simulation.lanes import SiteConfig
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of
 
@@ -48,7 +48,9 @@ def case_of(walked: Sequence[Sequence[Trajectory]], part: int) -> ProtocolCase:
 
 def test_batches_end_where_all_at_once_ends(walked, site):
     ends = [
-        list(looks(walked[2], site, Window(batch=batch)))[-1].finding.fused.values
+        list(assessed_windows(walked[2], site, Window(batch=batch)))[
+            -1
+        ].assessment.estimated.fused.values
         for batch in (30, None)
     ]
     assert_allclose(ends[0], ends[1], atol=1e-12)
@@ -56,7 +58,7 @@ def test_batches_end_where_all_at_once_ends(walked, site):
 
 def test_a_window_is_of_the_newest_tracks_and_begins_at_a_change(walked, site):
     tracks = [*walked[1], *walked[2]]
-    found = list(looks(tracks, site, Window(tracks=120, batch=40)))
+    found = list(assessed_windows(tracks, site, Window(tracks=120, batch=40)))
     assert [look.tracks for look in found] == [40, 80, 120, 160]
     assert [look.first for look in found[:2]] == [0, 0]
     cuts = [look.cut for look in found if look.cut is not None]
@@ -64,16 +66,16 @@ def test_a_window_is_of_the_newest_tracks_and_begins_at_a_change(walked, site):
     assert abs(cuts[0] - 80) < 15
     after = [look for look in found if look.cut is None and look.tracks > 120]
     assert all(look.first == cuts[-1] for look in after)
-    final = found[-1].finding
+    final = found[-1].assessment.estimated
     assert abs(math.degrees(final.pose.tilt_rad - KNOCKED.tilt_rad)) < 0.7
 
 
 def test_windows_are_no_older_than_they_may_be(walked, site):
     newest_s = walked[1][-1].time_s[-1]
     old_s = newest_s - walked[1][40].time_s[-1]
-    (look,) = looks(walked[1], site, Window(days=(old_s + 1e-3) / 86_400, batch=None))
+    (look,) = assessed_windows(walked[1], site, Window(days=(old_s + 1e-3) / 86_400, batch=None))
     assert look.first == 40
-    assert look.seen.tracks == 40
+    assert len(look.assessment.observed.ended_s) == 40
 
 
 def test_a_served_case_is_judged_beside_the_truth(walked, site):
@@ -84,10 +86,10 @@ def test_a_served_case_is_judged_beside_the_truth(walked, site):
     assert_allclose(moves, [5.0, -4.0, math.log(1.08), 0.0], atol=1e-9)
     assert told.rotation_deg < 1.0
     assert told.height_error < 0.05
-    (look,) = looks(walked[2], site, Window(batch=None))
-    by_hand = look.finding.fused.values[0] - KNOCKED.tilt_rad
+    (look,) = assessed_windows(walked[2], site, Window(batch=None))
+    by_hand = look.assessment.estimated.fused.values[0] - KNOCKED.tilt_rad
     assert told.parameters[0].error == pytest.approx(math.degrees(by_hand), abs=1e-6)
-    assert parameters_beside(look.finding, PRIOR, KNOCKED) == told.parameters
+    assert parameters_beside(look.assessment.estimated, PRIOR, KNOCKED) == told.parameters
 
 
 def test_nothing_is_made_up_where_nobody_walks_or_nothing_is_known(walked, site):

@@ -1,6 +1,6 @@
 """One of everything before a simulated camera, so that all it needs is compiled, as installed.
 
-python -m models.pose.warm_up
+python -m models.assessment.warm_up
 """
 
 import math
@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.assessment.monitor import AlarmRate, alarm_chart_result
 from models.geometry.ground import ground_from_pixel
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.upright import tops_seen
-from models.pose.alarms import AlarmRate, alarm_chart_result
 from models.pose.estimating import PoseFinding, estimate_pose
 from models.pose.site import learn_site
 from models.simulation.poses import PoseOffset, offset_trajectory, repeated_pose

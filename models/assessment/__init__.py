@@ -1,0 +1,50 @@
+"""Assess a camera: has it moved, and where is it now. `assess` is the one way to that answer."""
+
+from models.assessment.assess import DatedFactor, assess, conclude, next_state
+from models.assessment.decide import change_of, is_site_changed
+from models.assessment.monitor import AlarmRate, alarm_chart_result, tracks_a_year
+from models.assessment.observe import MOST_PIECES
+from models.assessment.reasons import reason_of_drift
+from models.assessment.slow_drift import begin_creep_log, log_creep, without_creep
+from models.assessment.values import (
+    NO_TIME,
+    Assessment,
+    AssessmentLimits,
+    AssessmentState,
+    CameraState,
+    Decision,
+    TimeSpan,
+    TrackWindow,
+    UnlearnedSite,
+    Verdict,
+)
+from models.assessment.verdict import judge, may_be_alerted
+
+__all__ = [
+    "MOST_PIECES",
+    "NO_TIME",
+    "AlarmRate",
+    "Assessment",
+    "AssessmentLimits",
+    "AssessmentState",
+    "CameraState",
+    "DatedFactor",
+    "Decision",
+    "TimeSpan",
+    "TrackWindow",
+    "UnlearnedSite",
+    "Verdict",
+    "alarm_chart_result",
+    "assess",
+    "begin_creep_log",
+    "change_of",
+    "conclude",
+    "is_site_changed",
+    "judge",
+    "log_creep",
+    "may_be_alerted",
+    "next_state",
+    "tracks_a_year",
+    "reason_of_drift",
+    "without_creep",
+]

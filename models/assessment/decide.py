@@ -1,0 +1,177 @@
+"""Stage 4, decide: the camera's state, its verdict, the cause and the time of a move."""
+
+import numpy as np
+
+from models.assessment.scale_faults import (
+    charted_clock,
+    clock_fault,
+    may_be_clock,
+    reason_of_causes,
+)
+from models.assessment.values import (
+    NO_TIME,
+    AssessmentLimits,
+    AssessmentState,
+    CameraState,
+    Decision,
+    Observed,
+    TimeSpan,
+    Verdict,
+)
+from models.assessment.verdict import judge
+from models.durations import DAY_S
+from models.geometry.pose import ANGLES, PARAMETERS
+from models.monitoring.chart import ChartResult
+from models.monitoring.creep import Creep
+from models.monitoring.drift import LIKELY
+from models.pose import config
+from models.pose.estimating import PoseFinding
+from models.pose.hypotheses import PosePosterior
+from models.pose.pose_fit import FusedEstimate
+from models.reasons import Reason
+
+
+def decide(
+    observed: Observed,
+    found: PoseFinding,
+    chart: ChartResult | None,
+    slow_drift: Creep | None,
+    *,
+    mapped: bool,
+    state: AssessmentState,
+    limits: AssessmentLimits,
+) -> Decision:
+    """Decide on a window.
+
+    `mapped` is whether the site has a map of paths: without one a turn in heading stays unseen.
+    """
+    posterior, drift, rate_hz = found.posterior, found.drift, limits.frame_rate_hz
+    named = reason_of_causes(
+        found.causes, posterior.moved, limits.drift.certainty, rate_hz, state.drifted
+    )
+    cause = named
+    if found.causes is None:
+        cause = clock_fault(drift, posterior.turned, found.prior, rate_hz)
+    counting = _counting_chart(chart, posterior, cause, state)
+    verdict = judge(
+        drift,
+        limits.drift,
+        state.drifted,
+        counting,
+        slow_drift,
+        enough=observed.enough or posterior.pictured,
+        scaled=named is not None,
+    )
+    camera = _state_of(observed, found, verdict, mapped=mapped, state=state)
+    if cause is None and counting is not None and verdict.alarmed:
+        cause = charted_clock(counting, posterior.turned)
+    moved_at = _moved_at(observed, found, chart, slow_drift, verdict, camera, state)
+    return Decision(state=camera, verdict=verdict, cause=cause, moved_at=moved_at)
+
+
+def _state_of(
+    observed: Observed,
+    found: PoseFinding,
+    verdict: Verdict,
+    *,
+    mapped: bool,
+    state: AssessmentState,
+) -> CameraState:
+    """The first rule that holds.
+
+    An image decides alone whether the camera moved. Before enough people came since an operator's
+    answer, that answer holds. Paths that nobody walked stay so until people are seen there again.
+    """
+    posterior, fused, enough = found.posterior, found.fused, observed.enough
+    moved = posterior.moved >= LIKELY
+    seen_again = enough and (fused.registered or not mapped)
+    stationary = not moved and is_detectable(posterior, fused, mapped=mapped)
+    rules = (
+        (verdict.drifting, CameraState.DRIFTING),
+        (posterior.pictured, CameraState.SUSPECTED if moved else CameraState.OK),
+        (state.unsure and not seen_again, CameraState.UNSURE),
+        (fused.paths_changed and enough, CameraState.UNSURE),
+        (moved and enough and not fused.paths_changed, CameraState.SUSPECTED),
+        (stationary and not fused.paths_changed, CameraState.OK),
+        (not enough and state.false_alarm, CameraState.OK),
+    )
+    return next((found for holds, found in rules if holds), CameraState.LEARNING)
+
+
+def is_site_changed(posterior: PosePosterior, fused: FusedEstimate) -> bool:
+    """True if an image shows a stationary camera while people walk elsewhere."""
+    stationary = posterior.pictured and posterior.moved < LIKELY
+    return stationary and (fused.paths_changed or posterior.site_changed >= LIKELY)
+
+
+def is_detectable(posterior: PosePosterior, fused: FusedEstimate, *, mapped: bool) -> bool:
+    """True if a turn of 12 deg would have been detected, and none of 5 deg is possible.
+
+    Of a site that is `mapped`, in heading too.
+    """
+    angles = [name for name in ANGLES if mapped or name != "heading"]
+    sds = np.sqrt(np.diag(fused.covariance))
+    if not fused.identifiable or (mapped and not fused.registered) or fused.paths_changed:
+        return False
+    detected = all(sds[PARAMETERS.index(name)] < config.NOTICED_SD for name in angles)
+    ends = [abs(end) for name in angles for end in posterior.interval(name, 0.9)]
+    return detected and max(ends) < config.NOTICED_RAD
+
+
+def _counting_chart(
+    chart: ChartResult | None,
+    posterior: PosePosterior,
+    cause: Reason | None,
+    state: AssessmentState,
+) -> ChartResult | None:
+    """The drift chart's result, unless something else than a move explains it."""
+    if chart is None or (cause is None and not state.drifted and may_be_clock(chart)):
+        return None
+    if posterior.pictured and posterior.moved < LIKELY:
+        return None  # people changed their ways in front of a stationary camera
+    return chart
+
+
+def _moved_at(
+    observed: Observed,
+    found: PoseFinding,
+    chart: ChartResult | None,
+    slow_drift: Creep | None,
+    verdict: Verdict,
+    camera: CameraState,
+    state: AssessmentState,
+) -> TimeSpan:
+    """The time of a move, or of a suspected one, as far as the tracks reveal it."""
+    reported = state.moved_at or NO_TIME
+    if verdict.streak <= 0 and camera != CameraState.SUSPECTED:
+        return reported if verdict.drifting else NO_TIME
+    change = change_of(observed, found) or state.change
+    if change is not None:
+        return _between(change.after_s, change.before_s)
+    if reported.before_s is not None:
+        return reported
+    if chart is not None and chart.moved:
+        at = chart.track_idx
+        after_s = observed.ended_s[at - 1] if at else state.stationary_until_s
+        return _between(after_s, observed.started_s[at])
+    if slow_drift is not None and slow_drift.moved:
+        return TimeSpan(None, slow_drift.since_day * DAY_S)
+    # One pose since the reference and never another: it had moved before all of these tracks.
+    if state.assessed_until_s is None:
+        return _between(state.stationary_until_s, observed.ended_s[found.first])
+    return _between(state.assessed_until_s, observed.ended_s[-1])
+
+
+def change_of(observed: Observed, found: PoseFinding) -> TimeSpan | None:
+    """The time of the change that was found in a window, between two tracks; None without one."""
+    at = found.change_idx
+    if at is None:
+        return None
+    return TimeSpan(observed.ended_s[at - 1] if at else None, observed.started_s[at])
+
+
+def _between(after_s: float | None, before_s: float | None) -> TimeSpan:
+    """The time of a move between one person before it and one after it, who may overlap."""
+    if after_s is None or before_s is None:
+        return TimeSpan(None, before_s)
+    return TimeSpan(min(after_s, before_s), max(after_s, before_s))

@@ -1,0 +1,108 @@
+"""Drift from the prior pose with its probabilities, and the limits from which it counts."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters
+from models.geometry.rotation import angle_between
+
+LIKELY = 0.5  # likelier than not
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveProbabilities:
+    """How likely a camera has moved, and changed each of its parameters by that."""
+
+    moved: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drift:
+    """Pose minus prior pose: `by` how much, and its standard deviations.
+
+    `identifiable` names the parameters that the tracks determine; the others stand here but count
+    nowhere. `angle_rad` is the whole rotation that the identifiable angles make. `move` is how
+    likely one is.
+    """
+
+    by: PoseParameters
+    sd: PoseParameters
+    angle_rad: float
+    identifiable: tuple[str, ...]
+    move: MoveProbabilities
+
+    def of(self, name: str) -> tuple[float, float]:
+        """A parameter's drift and its standard deviation: in metres for height, else in radians."""
+        return self.by.of(name), self.sd.of(name)
+
+    def ratio(self, name: str, limits: "DriftLimits") -> float:
+        """A parameter's drift in units of its floor."""
+        return abs(self.by.of(name)) / max(limits.floor(name), 1e-12)
+
+    @property
+    def has_angle(self) -> bool:
+        """True where an angle is identifiable."""
+        return bool(set(ANGLES) & set(self.identifiable))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriftLimits:
+    """Limits of a drift: how certain a move has to be, and floors of its size.
+
+    A drift ends below `clear_ratio` of the floor. Once a person has said how the camera stands, so
+    many `people` have to come before anything else is said. The defaults are those of the service's
+    settings.
+    """
+
+    certainty: float = 0.99
+    floor_rad: float = math.radians(1.0)
+    floor_m: float = 0.3
+    people: int = 12
+    clear_ratio: float = 0.7
+
+    def floor(self, name: str) -> float:
+        """The least drift of a parameter that counts: metres, or radians."""
+        return self.floor_m if name == "height" else self.floor_rad
+
+
+def drift_between(
+    found: PoseParameters,
+    sd: PoseParameters,
+    identifiable: Sequence[str],
+    prior: CameraPose,
+    move: MoveProbabilities,
+) -> Drift:
+    """Drift: pose less prior pose; x and y count as unmoved."""
+    drift = Drift(
+        by=PoseParameters(
+            height_m=found.height_m - prior.height_m,
+            tilt_rad=min(max(found.tilt_rad, -math.pi / 2), math.pi / 2) - prior.tilt_rad,
+            roll_rad=math.remainder(found.roll_rad - prior.roll_rad, 2 * math.pi),
+            heading_rad=math.remainder(found.heading_rad - prior.heading_rad, 2 * math.pi),
+        ),
+        sd=sd,
+        angle_rad=0.0,
+        identifiable=tuple(name for name in PARAMETERS if name in identifiable),
+        move=move,
+    )
+    turned = pose_after(drift, prior)
+    return replace(
+        drift, angle_rad=float(angle_between(turned.quaternion_wxyz, prior.quaternion_wxyz))
+    )
+
+
+def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
+    """The prior pose moved by the identifiable drift; the rest stays the prior's."""
+    turn = 2 * math.pi
+    by = {name: drift.by.of(name) if name in drift.identifiable else 0.0 for name in PARAMETERS}
+    heading = prior.heading_rad + by["heading"]
+    return replace(
+        prior,
+        height_m=prior.height_m + by["height"],
+        tilt_rad=prior.tilt_rad + by["tilt"],
+        roll_rad=prior.roll_rad + by["roll"],
+        # Within one turn, as a prior pose has to be.
+        heading_rad=heading if abs(heading) <= turn else math.fmod(heading, turn),
+    )
