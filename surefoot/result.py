@@ -11,9 +11,10 @@ from models.monitoring.chart import CLOCK
 from models.monitoring.drift import Drift
 from models.pose import PosePosterior
 from models.reasons import TracksCode
+from models.tracks.trajectory import by_end
 from surefoot.camera import Pose
 from surefoot.site import Site
-from surefoot.tracks import Track, in_order
+from surefoot.tracks import Track
 
 _CAUSES: dict[StrEnum, str] = {
     TracksCode.SCALE_CHANGED: "clock",
@@ -83,7 +84,7 @@ def estimate(site: Site, tracks: Sequence[Track], *, alarms_a_year: float = 1.0)
     Raises:
         TooFewTrajectoriesError: fewer than 5 people walk.
     """
-    model, ordered = site.model, in_order(tracks)
+    model, ordered = site.model, by_end(tracks)
     found = assess(
         TrackWindow(trajectories=ordered),
         model,

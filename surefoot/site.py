@@ -10,9 +10,10 @@ from models.errors import CheckpointError
 from models.monitoring.chart import chart_from_bytes, chart_to_bytes
 from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import CameraSite, learn_site, observe
+from models.tracks.trajectory import by_end
 from models.walking.speed_reference import reference_from_bytes, reference_to_bytes
 from surefoot.camera import Camera, camera_of
-from surefoot.tracks import Track, in_order
+from surefoot.tracks import Track
 
 _CAMERA, _WALKING, _PATHS, _CHART = "camera.json", "walking", "paths", "chart"
 
@@ -50,7 +51,7 @@ def learn(camera: Camera, tracks: Sequence[Track], *, seed: int = 0) -> Site:
         TooFewTrajectoriesError: fewer than 5 people walk.
     """
     prior = camera.prior_pose.in_radians
-    observed = observe(in_order(tracks), camera.intrinsics, prior)
+    observed = observe(by_end(tracks), camera.intrinsics, prior)
     return Site(camera=camera, model=learn_site(observed, camera.intrinsics, prior, seed=seed))
 
 

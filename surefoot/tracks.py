@@ -2,13 +2,13 @@
 
 import csv
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from models.errors import ShapeError
-from models.tracks.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory, by_end
 
 Track = Trajectory
 
@@ -49,12 +49,7 @@ def read_tracks(
     for name, time_s, *point in rows:
         points[name][time_s] = (point[0], point[1], point[2])
     tracks = (_track(each) for each in points.values())
-    return in_order(track for track in tracks if track.long_enough)
-
-
-def in_order(tracks: Iterable[Track]) -> list[Track]:
-    """Tracks in the order of their ends, the same in whatever order they come."""
-    return sorted(tracks, key=lambda each: (each.time_s[-1], each.time_s[0], *each.uv[0]))
+    return by_end(track for track in tracks if track.long_enough)
 
 
 def _named(lines: Iterator[str]) -> Iterator[_Row]:

@@ -44,9 +44,11 @@ MODEL_ROOMS = [
     {"paths"},
     {"monitoring"},
     {"pose"},
+    {"assessment"},
 ]
 # What the service asks of models, and nothing deeper: by module, what for.
 PUBLIC_MODELS = {
+    "models.assessment": "the one way to the answer whether a camera moved, and where it is now",
     "models.durations": "hours and days in seconds",
     "models.effort": "the CPU time that a look may take",
     "models.errors": "what a calibration may fail by",

@@ -16,6 +16,7 @@ from models.assessment.explain import explain
 from models.assessment.monitor import chart_of, slow_drift_of
 from models.assessment.observe import observe_window
 from models.assessment.values import (
+    FIRST_STATE,
     Assessment,
     AssessmentLimits,
     AssessmentState,
@@ -36,7 +37,6 @@ from models.walking.config import FEWEST_WALKERS
 
 MAP = "flow_map"  # the part whose failure leaves a site without its map of paths
 _LATER = 0.25  # of the tracks: so many may have come after a momentary factor that still counts
-_FIRST_STATE = AssessmentState()
 _USUAL_LIMITS = AssessmentLimits()
 
 
@@ -60,7 +60,7 @@ class DatedFactor:
 def assess(
     window: TrackWindow,
     site: CameraSite | UnlearnedSite,
-    state: AssessmentState = _FIRST_STATE,
+    state: AssessmentState = FIRST_STATE,
     limits: AssessmentLimits = _USUAL_LIMITS,
     factors: Sequence[DatedFactor] = (),
     failures: Sequence[PartialFailure] = (),
@@ -90,16 +90,18 @@ def assess(
     if drifts_slowly and site.baseline is not None:
         site = replace(site, paths=site.baseline.paths, chart=site.baseline.chart)
     chart = _chart(observed, site, limits, 0, failed)
-    basis = (chart is not None and chart.suspicious, drifts_slowly)
+    suspicious = chart is not None and chart.suspicious
+    begin = begin_at(state.warm_start, suspicious=suspicious, drifts_slowly=drifts_slowly)
 
-    found = estimate_pose(
-        observed.tracks, site, _begin(state.warm_start, basis), alerted=state.alerted
-    )
+    found = estimate_pose(observed.tracks, site, begin, alerted=state.alerted)
     failed.extend(found.failures)
     moved_prior = limits.moved_prior
     if drifts_slowly:
         moved_prior = raised_by_slow_drift(moved_prior, observed.tracks, limits.alarms_a_year)
-    found = replace(found, moved_prior=moved_prior, warm_start=_kept(found.warm_start, basis))
+    warm_start = found.warm_start
+    if warm_start is not None:
+        warm_start = replace(warm_start, charted=suspicious, drifts_slowly=drifts_slowly)
+    found = replace(found, moved_prior=moved_prior, warm_start=warm_start)
     if found.first:
         chart = _chart(observed, site, limits, found.first, failed)
     alarmed = partial(since_alarm, found, observed.tracks, site, chart)
@@ -135,7 +137,7 @@ def conclude(
     slow_drift: Creep | None = None,
     *,
     mapped: bool,
-    state: AssessmentState = _FIRST_STATE,
+    state: AssessmentState = FIRST_STATE,
     limits: AssessmentLimits = _USUAL_LIMITS,
     factors: Sequence[DatedFactor] = (),
 ) -> Assessment:
@@ -187,18 +189,17 @@ def _chart(
     return unless_failed(failed, "chart", partial(chart_of, observed, site, limits, first_idx))
 
 
-def _begin(warm_start: WarmStart | None, basis: tuple[bool, bool]) -> WarmStart | None:
-    """Where a search may begin; None if the one before was made on another basis."""
-    if warm_start is None or (warm_start.charted, warm_start.drifts_slowly) != basis:
-        return None
-    return warm_start
+def begin_at(
+    warm_start: WarmStart | None, *, suspicious: bool, drifts_slowly: bool
+) -> WarmStart | None:
+    """Where a search may begin; None if the one before was made on another basis.
 
-
-def _kept(warm_start: WarmStart | None, basis: tuple[bool, bool]) -> WarmStart | None:
-    if warm_start is None:
+    The basis is whether the chart is `suspicious`, and whether the first map is in use because the
+    camera `drifts_slowly`.
+    """
+    if warm_start is None or warm_start.charted != suspicious:
         return None
-    charted, drifts_slowly = basis
-    return replace(warm_start, charted=charted, drifts_slowly=drifts_slowly)
+    return warm_start if warm_start.drifts_slowly == drifts_slowly else None
 
 
 def _counting(

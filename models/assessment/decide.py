@@ -9,7 +9,9 @@ from models.assessment.scale_faults import (
     reason_of_causes,
 )
 from models.assessment.values import (
+    FIRST_STATE,
     NO_TIME,
+    NO_VERDICT,
     AssessmentLimits,
     AssessmentState,
     CameraState,
@@ -62,38 +64,40 @@ def decide(
         enough=observed.enough or posterior.pictured,
         scaled=named is not None,
     )
-    camera = _state_of(observed, found, verdict, mapped=mapped, state=state)
+    camera = state_of(
+        posterior, found.fused, verdict, enough=observed.enough, mapped=mapped, carried=state
+    )
     if cause is None and counting is not None and verdict.alarmed:
         cause = charted_clock(counting, posterior.turned)
     moved_at = _moved_at(observed, found, chart, slow_drift, verdict, camera, state)
     return Decision(state=camera, verdict=verdict, cause=cause, moved_at=moved_at)
 
 
-def _state_of(
-    observed: Observed,
-    found: PoseFinding,
-    verdict: Verdict,
+def state_of(
+    posterior: PosePosterior,
+    fused: FusedEstimate,
+    verdict: Verdict = NO_VERDICT,
     *,
-    mapped: bool,
-    state: AssessmentState,
+    enough: bool = True,
+    mapped: bool = True,
+    carried: AssessmentState = FIRST_STATE,
 ) -> CameraState:
-    """The first rule that holds.
+    """The state of a camera: the first rule that holds, else `learning`.
 
     An image decides alone whether the camera moved. Before enough people came since an operator's
     answer, that answer holds. Paths that nobody walked stay so until people are seen there again.
     """
-    posterior, fused, enough = found.posterior, found.fused, observed.enough
     moved = posterior.moved >= LIKELY
     seen_again = enough and (fused.registered or not mapped)
     stationary = not moved and is_detectable(posterior, fused, mapped=mapped)
     rules = (
         (verdict.drifting, CameraState.DRIFTING),
         (posterior.pictured, CameraState.SUSPECTED if moved else CameraState.OK),
-        (state.unsure and not seen_again, CameraState.UNSURE),
+        (carried.unsure and not seen_again, CameraState.UNSURE),
         (fused.paths_changed and enough, CameraState.UNSURE),
         (moved and enough and not fused.paths_changed, CameraState.SUSPECTED),
         (stationary and not fused.paths_changed, CameraState.OK),
-        (not enough and state.false_alarm, CameraState.OK),
+        (not enough and carried.false_alarm, CameraState.OK),
     )
     return next((found for holds, found in rules if holds), CameraState.LEARNING)
 

@@ -38,9 +38,12 @@ class AlarmRate:
 
 
 def tracks_a_year(tracks: Sequence[Trajectory]) -> float:
-    """The tracks that would come in a year, by the rate of tracks in the order of their ends."""
+    """The tracks that come in a year at the rate of some, which are in the order of their ends.
+
+    A recording of less than a day counts as a whole day.
+    """
     span_s = float(tracks[-1].time_s[-1] - tracks[0].time_s[-1]) if tracks else 0.0
-    return max(len(tracks), 1) * _YEAR_S / max(span_s, 1.0)
+    return max(len(tracks), 1) * _YEAR_S / max(span_s, DAY_S)
 
 
 def slow_drift_of(site: CameraSite, alarms_a_year: float) -> Creep | None:

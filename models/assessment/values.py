@@ -112,6 +112,9 @@ class AssessmentState:
     warm_start: WarmStart | None = None
 
 
+FIRST_STATE = AssessmentState()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observed:
     """Measurements of a window.
@@ -150,7 +153,7 @@ class Verdict:
         return bool(self.drifted)
 
 
-_UNDECIDED = Verdict()
+NO_VERDICT = Verdict()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,7 +165,7 @@ class Decision:
     """
 
     state: CameraState
-    verdict: Verdict = _UNDECIDED
+    verdict: Verdict = NO_VERDICT
     cause: Reason | None = None
     moved_at: TimeSpan = NO_TIME
 
@@ -174,8 +177,8 @@ class Assessment:
     `estimated` is the pose from the newest change on; tracks count from `estimated.first` on.
     `moved_by_tracks` is the probability of a move before factors had their part; None where none
     had. `detectable` (4, 3) are the smallest moves that 60, 250 and 800 people would reveal; None
-    of a site that is not learned. `reasons` come in the order of their weight. `failures` name parts
-    that could not be made.
+    of a site that is not learned. `reasons` come in the order of their weight. `failures` are the
+    parts that could not be made.
     """
 
     observed: Observed

@@ -140,8 +140,14 @@ def most_nodes(points: int, duration_s: float) -> int:
 
 
 def by_end(trajectories: Iterable[Trajectory]) -> list[Trajectory]:
-    """Trajectories in the order of their ends: as trackers post them, and estimators take them."""
-    return sorted(trajectories, key=lambda trajectory: float(trajectory.time_s[-1]))
+    """Trajectories in the order of their ends, in which estimators take them."""
+    return sorted(trajectories, key=end_key)
+
+
+def end_key(trajectory: Trajectory) -> tuple[float, ...]:
+    """Sort key of the order of ends. Of equal ends too, so that the same tracks have one order."""
+    time_s = trajectory.time_s
+    return (float(time_s[-1]), float(time_s[0]), *trajectory.uv[0].tolist())
 
 
 def end_to_end(pieces: Sequence[Trajectory]) -> Trajectory:

@@ -14,7 +14,7 @@ from models.geometry.pose import CameraPose
 from models.monitoring.drift import DriftLimits
 from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
-from models.tracks.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory, end_key
 from models.walking.config import FEWEST_WALKERS
 from service.estimation.carried_state import carried_state
 from service.estimation.seen_picture import SeenPicture, seen_picture
@@ -116,7 +116,8 @@ def until_so_many(
             loaded = limit
             every = load(loaded)
         all_there_are = len(every) < limit
-        records = every if all_there_are else every[-limit:] if newest else every[:limit]
+        chosen = every if all_there_are else every[-limit:] if newest else every[:limit]
+        records = sorted(chosen, key=lambda record: end_key(unpacked.feet(record)))
         before = link_pieces(
             [unpacked.seen(record, intrinsics) for record in records], intrinsics, prior
         )

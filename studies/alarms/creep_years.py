@@ -8,11 +8,12 @@ from typing import Self
 
 import numpy as np
 
+from models.assessment import begin_creep_log, log_creep
 from models.durations import DAY_S
 from models.geometry.pose import CameraPose
 from models.monitoring.config import CREEP_SHARE
 from models.monitoring.creep import Creep, creep_result
-from models.pose import CameraSite, begin_creep_log, learn_site, log_creep
+from models.pose import CameraSite, learn_site
 from models.simulation.poses import PoseOffset
 from models.tracks.trajectory import Trajectory
 from studies.simulation.habits import HabitConfig, draw_mixes, walk_days

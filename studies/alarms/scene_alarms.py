@@ -11,10 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from models.assessment import judge
 from models.geometry.pose import CameraPose, array_of
 from models.monitoring.chart import trace
 from models.monitoring.chart_learning import drawn_blocks
-from models.monitoring.drift import DriftLimits, judge
+from models.monitoring.drift import DriftLimits
 from models.monitoring.group_scores import score_groups
 from models.paths.likelihood import walkers_of
 from models.pose import Observations, observe

@@ -4,9 +4,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from models.pose.states import is_noticed
 from scipy.stats import multivariate_t, norm
 
+from models.assessment.decide import is_detectable
 from models.geometry.pose import PARAMETERS, CameraPose, array_of
 from models.pose import config, drift_of, pose_posterior
 from models.pose.pose_fit import FusedEstimate
@@ -153,7 +153,7 @@ def test_an_interval_is_of_all_that_may_have_moved_near_and_far():
 
 
 def noticed(fused, *, mapped=True):
-    return is_noticed(pose_posterior(fused, 40, PRIOR), fused, mapped=mapped)
+    return is_detectable(pose_posterior(fused, 40, PRIOR), fused, mapped=mapped)
 
 
 def test_steady_is_said_only_where_a_turn_would_have_been_noticed():

@@ -7,16 +7,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import multivariate_t
 
+from models.assessment.decide import is_site_changed, state_of
+from models.assessment.values import CameraState
 from models.errors import ShapeError
 from models.pose import (
     PictureEvidence,
     PoseFinding,
-    WindowState,
     config,
     drift_of,
     pose_posterior,
     posterior_by_picture,
-    state_of,
     with_picture,
 )
 from models.reasons import Reason, TracksCode
@@ -127,8 +127,9 @@ def test_people_who_walk_elsewhere_before_a_camera_that_stands_are_a_site_that_c
     assert both.site_changed > 0.99
     assert np.abs(np.degrees(both.offset)).max() < 0.05
     fused = estimate(tilt=3.0, heading=8.0)
-    assert state_of(both, fused, drifting=False, mapped=True) == WindowState.SITE_CHANGED
-    assert state_of(by, fused, drifting=False, mapped=True) == WindowState.SUSPECTED
+    assert state_of(both, fused) == CameraState.OK
+    assert is_site_changed(both, fused)
+    assert state_of(by, fused) == CameraState.SUSPECTED
 
 
 def test_people_who_walked_before_the_knock_do_not_hide_it():
@@ -141,17 +142,18 @@ def test_people_who_walked_before_the_knock_do_not_hide_it():
 def test_a_still_picture_of_unknown_paths_says_that_the_site_changed():
     lost = estimate(reason=Reason(code=TracksCode.PATHS_CHANGED, values={}), raw=None)
     by = pose_posterior(lost, 40, PRIOR)
-    assert state_of(by, lost, drifting=False, mapped=True) == WindowState.UNSURE
+    assert state_of(by, lost) == CameraState.UNSURE
     both = with_picture(by, picture())
-    assert state_of(both, lost, drifting=False, mapped=True) == WindowState.SITE_CHANGED
+    assert state_of(both, lost) == CameraState.OK
+    assert is_site_changed(both, lost)
 
 
 def test_a_picture_of_people_who_tell_little_says_that_the_camera_stands():
     few = pose_posterior(estimate(), 2, PRIOR)
     fused = estimate(identifiable=(), sd=np.full(4, 1.0))
-    assert state_of(few, fused, drifting=False, mapped=True) == WindowState.LEARNING
+    assert state_of(few, fused) == CameraState.LEARNING
     both = with_picture(few, picture())
-    assert state_of(both, fused, drifting=False, mapped=True) == WindowState.OK
+    assert state_of(both, fused) == CameraState.OK
 
 
 def test_without_a_picture_nothing_differs():
@@ -164,6 +166,6 @@ def test_without_a_picture_nothing_differs():
     for field in fields(alone):
         assert_array_equal(getattr(found.posterior, field.name), getattr(alone, field.name))
     assert not found.posterior.pictured
-    seen = replace(found, picture=picture(5.0)).posterior
+    seen = replace(found, factors=(picture(5.0),)).posterior
     assert seen.pictured
     assert seen.moved > alone.moved

@@ -6,23 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.assessment import AlarmRate, alarm_chart_result, judge
+from models.assessment.estimate import since_alarm
+from models.assessment.scale_faults import reason_of_causes
 from models.errors import ShapeError, TooFewTrajectoriesError
 from models.geometry.pose import array_of
 from models.monitoring.chart_learning import learn_chart
-from models.monitoring.drift import judge
 from models.monitoring.group_scores import score_groups
 from models.paths.folds import fold_maps
 from models.pose import (
-    AlarmRate,
     DriftLimits,
     PoseFinding,
-    alarm_chart_result,
     assume_site,
     estimate_pose,
     learn_site,
     observe,
-    reason_of_causes,
-    since_alarm,
 )
 from models.pose.causes import CLOCK_LOGS, LENS_LOGS, CauseGains, likeliest_causes
 from models.pose.change_point import find_change

@@ -5,14 +5,16 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
-from service.estimation.finding import Finding, asked_enough, zones_of
 
+from models.assessment import TrackWindow, conclude
+from models.assessment.observe import observe_window
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose
-from models.pose import pose_posterior, smallest_told
+from models.pose import PoseFinding, smallest_told
 from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.reasons import Reason, TracksCode
 from models.regression.recipe import plan_to_config
 from models.walking.estimate import JointEstimate
+from service.estimation.compute import ComputedEstimate, limits_of, zones_of
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
 from service.job_queue import JobQueue
@@ -102,7 +104,7 @@ def made_up(
     paths=False,
     changed=False,
     causes=None,
-) -> Finding:
+) -> ComputedEstimate:
     """What the tracks of a window come to: a pose, whose heading is identifiable by their `paths`.
 
     Where these have `changed`, people walk on none of them.
@@ -134,21 +136,24 @@ def made_up(
         )
     if changed:
         fused = replace(fused, reason=Reason(code=TracksCode.PATHS_CHANGED))
-    posterior = pose_posterior(fused, joint.walking_groups, evidence.prior)
-    seen = evidence.tracks[change or 0 :]
-    return Finding(
-        joint=joint,
-        fused=fused,
-        posterior=posterior,
-        power=smallest_told(fused, joint.walking_groups, joint.walkers, 200.0),
-        enough=asked_enough(evidence),
-        averaged=None,
-        reading=None,
-        creep=None,
-        causes=causes,
-        tracks=evidence.tracks,
-        zones=zones_of(evidence, seen, fused, posterior),
-        change=None if change is None else evidence.tracks[change],
+    found = PoseFinding(prior=evidence.prior, joint=joint, fused=fused, change_idx=change, first=0)
+    if causes is not None:
+        vars(found)["causes"] = causes  # instead of those that the tracks would come to
+    tracks = evidence.tracks
+    window = TrackWindow(
+        trajectories=[each.trajectory for each in tracks],
+        unanswered=np.array([each.unanswered for each in tracks]),
+    )
+    limits = limits_of(evidence)
+    observed = observe_window(window, evidence.intrinsics, evidence.prior, limits.drift.people)
+    assessment = conclude(
+        observed, found, mapped=evidence.flow is not None, state=evidence.state, limits=limits
+    )
+    power = smallest_told(fused, joint.walking_groups, joint.walkers, 200.0)
+    return ComputedEstimate(
+        assessment=replace(assessment, detectable=power),
+        tracks=tracks,
+        zones=zones_of(evidence, tracks[change or 0 :], assessment),
     )
 
 

@@ -8,8 +8,7 @@ import sys
 from dataclasses import replace
 from zlib import crc32
 
-from service.estimation.finding import Finding
-
+from service.estimation.compute import ComputedEstimate
 from service.estimation.evidence import Evidence
 from service.workers import estimate
 from tests.service.bench import made_up
@@ -18,7 +17,7 @@ MOVED = 500  # of so many cameras one has moved
 _TURN_RAD = math.radians(6)
 
 
-def found(evidence: Evidence, seed: int) -> Finding:
+def found(evidence: Evidence, seed: int) -> ComputedEstimate:
     """The prior pose; of one in five hundred, one that is turned."""
     pose = evidence.prior
     if has_moved(evidence.camera_id):
@@ -32,7 +31,7 @@ def has_moved(camera_id: str) -> bool:
 
 
 if __name__ == "__main__":
-    estimate.compute_finding = found
+    estimate.compute_estimate = found
     sys.argv = ["surefoot", "worker", "--name", sys.argv[1]]
     from service.cli import main
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from models.assessment import begin_creep_log, log_creep, without_creep
 from models.errors import CheckpointError
 from models.monitoring.creep import (
     DAY_S,
@@ -22,7 +23,7 @@ from models.monitoring.creep import (
     weeks_of,
 )
 from models.monitoring.group_scores import score_groups
-from models.pose import begin_creep_log, learn_site, log_creep, observe, without_creep
+from models.pose import learn_site, observe
 from models.serialization import flattened
 from models.simulation.poses import PoseOffset, offset_trajectory
 from models.tracks.trajectory import by_end

@@ -4,16 +4,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.assessment import judge, may_be_alerted
+from models.assessment.scale_faults import clock_fault
 from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters
 from models.monitoring.chart import ChartResult
 from models.monitoring.creep import Creep
 from models.monitoring.drift import (
     DriftLimits,
     MoveProbabilities,
-    clock_fault,
     drift_between,
-    judge,
-    may_be_told,
     pose_after,
 )
 from models.reasons import TracksCode
@@ -234,5 +233,5 @@ def test_no_drift_is_told_of_what_may_not_be_told(drifted, moved, statistic, cre
         creep = Creep(statistic=crept, level=10.0, parameter=0, by=0.1, sd=0.01, since_day=1.0)
     now = drift(5.0, move=likely(moved, tilt=1.0))
     told = judge(now, LIMITS, drifted, chart, creep).drifting
-    assert may_be_told(moved, LIMITS, creep, told=bool(drifted)) or not told
-    assert may_be_told(0.5, LIMITS, None, told=False) is False
+    assert may_be_alerted(moved, LIMITS, creep, alerted=bool(drifted)) or not told
+    assert may_be_alerted(0.5, LIMITS, None, alerted=False) is False

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from models.assessment.scale_faults import may_be_clock
 from models.errors import CheckpointError
 from models.geometry.pose import array_of
 from models.monitoring import chart_learning
@@ -23,7 +24,6 @@ from models.monitoring.chart import (
 from models.monitoring.chart import chart_result as chart_result_by
 from models.monitoring.chart_learning import drawn_blocks, learn_chart
 from models.monitoring.config import LENGTHS
-from models.monitoring.drift import may_be_clock
 from models.monitoring.group_scores import SCORES, GroupScores, Usual, score_groups
 from models.paths.folds import fold_maps
 from models.paths.reference import learn_paths

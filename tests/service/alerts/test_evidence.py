@@ -12,13 +12,15 @@ from tests.service.bench import PRIOR, made_up, moved
 
 
 def see_with(bench, pose, **fused):
-    """A look whose estimate has more to it than the bench makes up."""
+    """Store an estimate with more in it than the bench makes up."""
     bench.post(20)
     evidence = bench.refresh()
-    finding = made_up(evidence, pose, paths=True)
-    finding = replace(finding, fused=replace(finding.fused, **fused))
+    found = made_up(evidence, pose, paths=True)
+    estimated = found.assessment.estimated
+    estimated = replace(estimated, fused=replace(estimated.fused, **fused))
+    found = replace(found, assessment=replace(found.assessment, estimated=estimated))
     with bench.store.write() as session:
-        estimates.save_estimate(session, bench.queue, bench.settings, evidence, finding)
+        estimates.save_estimate(session, bench.queue, bench.settings, evidence, found)
 
 
 def test_an_alert_keeps_what_it_was_by(bench):

@@ -10,7 +10,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from service.estimation.finding import compute_finding
 from sqlalchemy import delete, select
 
 from models.paths.reference import paths_from_bytes
@@ -18,6 +17,7 @@ from models.pose import learn_site
 from models.tracks.trajectory import by_end
 from service.estimation import growth
 from service.estimation.anchoring import LearnedPaths
+from service.estimation.compute import compute_estimate
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import load_evidence
 from service.estimation.growth import compute_growth, load_growth, save_growth
@@ -131,7 +131,7 @@ def test_a_worker_that_dies_before_it_has_grown_leaves_it_to_the_next(known):
     context = known.context
     with context.store.read() as session:
         evidence = load_evidence(session, context.settings, "corner")
-    finding = compute_finding(evidence, 0)
+    finding = compute_estimate(evidence, 0)
     with context.store.write() as session:
         save_estimate(session, context.queue, context.settings, evidence, finding)
     period = due(known)

@@ -5,9 +5,9 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
-from service.estimation.finding import compute_finding
 
 from models.monitoring.chart import chart_from_bytes
+from service.estimation.compute import compute_estimate
 from service.estimation.evidence import load_evidence
 from service.store import references
 from service.store.references import FlowMapRecord
@@ -117,8 +117,8 @@ def test_fewer_allowed_alarms_need_more(street):
     for allowed in (0.01, 1.0, 100.0):
         settings = street.context.settings.model_copy(update={"false_alarms_per_year": allowed})
         with street.context.store.read() as session:
-            found = compute_finding(load_evidence(session, settings, "corner"), 0)
-        levels.append(found.reading.level)
+            found = compute_estimate(load_evidence(session, settings, "corner"), 0)
+        levels.append(found.assessment.chart.level)
     assert levels[0] > levels[1] > levels[2]
 
 

@@ -6,12 +6,12 @@ from datetime import datetime
 
 import numpy as np
 import pytest
-from service.estimation.finding import compute_finding
 
 from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose import estimate_pose, learn_site
 from models.walking.estimate import joint_estimate
 from models.walking.speed_reference import reference_from_bytes
+from service.estimation.compute import compute_estimate
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Unpacked, load_evidence
 from service.store import references
@@ -283,7 +283,7 @@ def test_an_estimate_that_a_reset_overtakes_is_dropped(known):
     context = known.context
     with context.store.read() as session:
         evidence = load_evidence(session, context.settings, "corner")
-    finding = compute_finding(evidence, 0)
+    finding = compute_estimate(evidence, 0)
     known.http.post("/cameras/corner/reference/reset").raise_for_status()
     with context.store.write() as session:
         stored = save_estimate(session, context.queue, context.settings, evidence, finding)
