@@ -14,7 +14,8 @@ ROOT = Path(models.__path__[0]).parent
 ASK = """
 import gc
 from models.compiled import _Compiled
-from models.pose import AlarmRate, estimate_pose, learn_site, observe, alarm_chart_result
+from models.assessment import AlarmRate, alarm_chart_result
+from models.pose import estimate_pose, learn_site, observe
 from models.assessment.warm_up import warm_up
 from models.tracks.trajectory import by_end
 from tests.models.sites import KNOCKED, LENS, PRIOR, tracks_of

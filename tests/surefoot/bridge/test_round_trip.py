@@ -14,7 +14,7 @@ from models.geometry.upright import tops_of_boxes
 from models.pose import self_calibrate
 from models.simulation.walkers import WalkConfig
 from models.tracks.scenes import load_scene
-from models.tracks.trajectory import Trajectory
+from models.tracks.trajectory import Trajectory, by_end
 from service.formats.batch import read_json
 from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
@@ -23,7 +23,6 @@ from surefoot.bridge import rows
 from surefoot.bridge.assembler import Assembler
 from surefoot.bridge.feeds import Topics, read_feeds
 from surefoot.bridge.values import WholeTrack, body_of
-from surefoot.tracks import in_order
 from tests.conftest import SCENES
 from tests.surefoot.bridge.stand import frigate_event
 from tests.surefoot.test_client import OK, Stub
@@ -123,7 +122,7 @@ def tracks_in(scene, body, read=read_json, clock=NO_CLOCK):
     limits = Limits(width=lens.width, height=lens.height, now_s=T0 + 1e5, max_ahead_s=60.0)
     batch = read(body, clock, limits)
     assert not batch.rejections or {each.code for each in batch.rejections} == {"too_short"}
-    return in_order(
+    return by_end(
         surefoot.Track(
             time_s=each.points[:, 0],
             uv=each.points[:, 1:3],
