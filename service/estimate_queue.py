@@ -31,6 +31,8 @@ def request_estimate(
     being looked at, is queued by the upkeep when its time has come.
     """
     camera = session.get(CameraRecord, camera_id)
+    if camera is not None and watched:
+        camera.full_estimate_asked = True
     if camera is not None and camera.estimate_due_at is None:
         now = _now()
         camera.estimate_due_at = now
@@ -82,10 +84,15 @@ def leave_poisoned(session: Session, camera_id: str) -> bool:
     return True
 
 
-def begin_look(session: Session, camera_id: str) -> int | None:
-    """Take the mark "due" off a camera; returns the track that was stored last."""
-    camera = session.get(CameraRecord, camera_id)
+def begin_look(session: Session, camera_id: str) -> tuple[int | None, bool]:
+    """Take the mark "due" off a camera.
+
+    Returns:
+        The track that was stored last, and whether a full estimate is asked for.
+    """
+    camera, asked = session.get(CameraRecord, camera_id), False
     if camera is not None:
+        asked, camera.full_estimate_asked = camera.full_estimate_asked, False
         now = _now()
         if camera.estimate_tries and camera.estimate_error is None:
             _note_failure(camera, _DIED, now)
@@ -93,7 +100,7 @@ def begin_look(session: Session, camera_id: str) -> int | None:
         camera.estimate_tries += 1
         # Should the worker die of it, this is all that is left to know it by.
         camera.estimate_after = now + timedelta(seconds=cooldown_s(camera.estimate_tries))
-    return tracks.newest_pk(session, camera_id)
+    return tracks.newest_pk(session, camera_id), asked
 
 
 def budget_of(session: Session, camera_id: str) -> LookBudget:
@@ -139,7 +146,7 @@ def end_look(
     """
     camera = session.get(CameraRecord, camera_id)
     if camera is not None:
-        camera.looked_at_pk = newest_pk
+        camera.looked_at_pk, camera.checked_at = newest_pk, _now()
         camera.estimate_tries = 0
         camera.estimate_error = camera.estimate_failing_since = None
         camera.estimate_after = _now() + timedelta(seconds=min(rest_s, LONGEST_COOLDOWN_S))

@@ -102,6 +102,8 @@ table(
     *needed(NUMBER, "reference_tracks", "version"),
     *optional(DateTime, "estimate_due_at"),
     *optional(NUMBER, "looked_at_pk"),
+    *optional(DateTime, "checked_at"),
+    *needed(Boolean, "full_estimate_asked"),
     *needed(NUMBER, "estimate_tries"),
     *optional(String, "estimate_error"),
     *optional(DateTime, "estimate_failing_since", "estimate_after"),

@@ -1,6 +1,6 @@
 """Assess a camera: has it moved, and where is it now. `assess` is the one way to that answer."""
 
-from models.assessment.assess import DatedFactor, assess, conclude, next_state
+from models.assessment.assess import DatedFactor, Monitored, assess, conclude, monitor, next_state
 from models.assessment.decide import change_of, is_site_changed
 from models.assessment.monitor import AlarmRate, alarm_chart_result, tracks_a_year
 from models.assessment.observe import MOST_PIECES
@@ -30,6 +30,7 @@ __all__ = [
     "CameraState",
     "DatedFactor",
     "Decision",
+    "Monitored",
     "TimeSpan",
     "TrackWindow",
     "UnlearnedSite",
@@ -43,6 +44,7 @@ __all__ = [
     "judge",
     "log_creep",
     "may_be_alerted",
+    "monitor",
     "next_state",
     "tracks_a_year",
     "reason_of_drift",

@@ -57,18 +57,39 @@ class DatedFactor:
         return sum(each > self.at_s for each in ended_s) <= _LATER * len(ended_s)
 
 
-def assess(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Monitored:
+    """Results of the first two stages: measurements, the drift chart and the slow drift.
+
+    `site` is the one to estimate by: with the first map of paths if the camera drifts slowly.
+    `mapped` is whether it has a map at all.
+    """
+
+    observed: Observed
+    site: CameraSite
+    mapped: bool
+    chart: ChartResult | None
+    slow_drift: Creep | None
+    failures: tuple[PartialFailure, ...] = ()
+
+    @property
+    def suspicious(self) -> bool:
+        """True if the chart is above its watch level, which is below its alarm level."""
+        return self.chart is not None and self.chart.suspicious
+
+    @property
+    def drifts_slowly(self) -> bool:
+        """True if the slow drift is beyond its level."""
+        return self.slow_drift is not None and self.slow_drift.moved
+
+
+def monitor(
     window: TrackWindow,
     site: CameraSite | UnlearnedSite,
-    state: AssessmentState = FIRST_STATE,
     limits: AssessmentLimits = _USUAL_LIMITS,
-    factors: Sequence[DatedFactor] = (),
     failures: Sequence[PartialFailure] = (),
-) -> Assessment:
-    """Assess a camera by the tracks of a window, in the order of their ends.
-
-    `state` is what the assessment before left. `failures` are of parts that could not be read:
-    without a part that is not needed, the rest goes on.
+) -> Monitored:
+    """Observe and monitor a window: the cheap half of an assessment.
 
     Raises:
         TooFewTrajectoriesError: fewer than five people walk.
@@ -84,14 +105,43 @@ def assess(
     if isinstance(site, UnlearnedSite):
         site = assume_site(observed.tracks, site.intrinsics, site.prior, site.walk)
     mapped = site.paths is not None or any(each.part == MAP for each in failed)
-
     slow_drift = unless_failed(failed, "anchor", partial(slow_drift_of, site, limits.alarms_a_year))
-    drifts_slowly = slow_drift is not None and slow_drift.moved
-    if drifts_slowly and site.baseline is not None:
+    if slow_drift is not None and slow_drift.moved and site.baseline is not None:
         site = replace(site, paths=site.baseline.paths, chart=site.baseline.chart)
     chart = _chart(observed, site, limits, 0, failed)
-    suspicious = chart is not None and chart.suspicious
-    begin = begin_at(state.warm_start, suspicious=suspicious, drifts_slowly=drifts_slowly)
+    return Monitored(
+        observed=observed,
+        site=site,
+        mapped=mapped,
+        chart=chart,
+        slow_drift=slow_drift,
+        failures=tuple(failed),
+    )
+
+
+def assess(
+    window: TrackWindow | Monitored,
+    site: CameraSite | UnlearnedSite,
+    state: AssessmentState = FIRST_STATE,
+    limits: AssessmentLimits = _USUAL_LIMITS,
+    factors: Sequence[DatedFactor] = (),
+    failures: Sequence[PartialFailure] = (),
+) -> Assessment:
+    """Assess a camera by the tracks of a window, in the order of their ends.
+
+    A window that was `monitor`ed by the same limits is not observed again. `state` is what the
+    assessment before left. `failures` are of parts that could not be read: without a part that is
+    not needed, the rest goes on.
+
+    Raises:
+        TooFewTrajectoriesError: fewer than five people walk.
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    if not isinstance(window, Monitored):
+        window = monitor(window, site, limits, failures)
+    observed, site, chart = window.observed, window.site, window.chart
+    failed, drifts_slowly = list(window.failures), window.drifts_slowly
+    begin = begin_at(state.warm_start, suspicious=window.suspicious, drifts_slowly=drifts_slowly)
 
     found = estimate_pose(observed.tracks, site, begin, alerted=state.alerted)
     failed.extend(found.failures)
@@ -100,7 +150,7 @@ def assess(
         moved_prior = raised_by_slow_drift(moved_prior, observed.tracks, limits.alarms_a_year)
     warm_start = found.warm_start
     if warm_start is not None:
-        warm_start = replace(warm_start, charted=suspicious, drifts_slowly=drifts_slowly)
+        warm_start = replace(warm_start, charted=window.suspicious, drifts_slowly=drifts_slowly)
     found = replace(found, moved_prior=moved_prior, warm_start=warm_start)
     if found.first:
         chart = _chart(observed, site, limits, found.first, failed)
@@ -116,8 +166,8 @@ def assess(
         observed,
         found,
         chart,
-        slow_drift,
-        mapped=mapped,
+        window.slow_drift,
+        mapped=window.mapped,
         state=state,
         limits=limits,
         factors=counting,

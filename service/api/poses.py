@@ -151,7 +151,10 @@ class ServedPoseOut(BaseModel):
     from_: datetime | None = Field(serialization_alias="from")
     to: datetime | None
     model_id: str | None
-    updated_at: datetime | None
+    updated_at: datetime | None = Field(description="time of the last full estimate")
+    checked_at: datetime | None = Field(
+        description="time at which the newest stored tracks had been monitored"
+    )
     reason: str
     reason_code: ReasonCode | None
     reason_values: ReasonValues
@@ -183,6 +186,7 @@ class ServedPoseOut(BaseModel):
             to=None if estimate is None else from_seconds(estimate.to_s),
             model_id=view.model_id,
             updated_at=None if estimate is None else estimate.created_at,
+            checked_at=view.checked_at,
             reason=view.reason,
             reason_code=code_of(view.reasons),
             reason_values=values_of(view.reasons),

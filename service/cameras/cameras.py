@@ -128,6 +128,8 @@ def register_camera(
         version=1,
         estimate_due_at=None,
         looked_at_pk=None,
+        checked_at=None,
+        full_estimate_asked=False,
         created_at=now,
         updated_at=now,
     )

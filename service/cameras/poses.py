@@ -41,6 +41,7 @@ class PoseView:
     pose: CameraPose
     reference: ReferenceView
     model_id: str | None
+    checked_at: datetime | None
     etag: str
 
     @property
@@ -73,7 +74,8 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
     why, lens = (reasons, in_words(reasons)), camera.intrinsics
-    served = (status.state.value, why, pose, estimate_id, reference, model_id, lens)
+    checked = camera.checked_at
+    served = (status.state.value, why, pose, estimate_id, reference, model_id, lens, checked)
     return PoseView(
         status=status,
         calibrated=calibrated,
@@ -82,6 +84,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         pose=pose,
         reference=reference,
         model_id=model_id,
+        checked_at=checked,
         etag=f'"{hashlib.sha256(repr(served).encode()).hexdigest()[:24]}"',
     )
 

@@ -11,10 +11,12 @@ from models.assessment import (
     Assessment,
     AssessmentLimits,
     DatedFactor,
+    Monitored,
     TrackWindow,
     UnlearnedSite,
     assess,
     may_be_alerted,
+    monitor,
 )
 from models.errors import CheckpointError, TooFewTrajectoriesError
 from models.monitoring.drift import pose_after
@@ -37,6 +39,7 @@ from models.regression.averaging import (
     TrackPredictions,
     averaged_estimate,
 )
+from service.estimation.due import is_full_estimate_due
 from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.moved_zones import MovedZones, moved_zones
 from service.estimation.partial_failures import PartialFailures
@@ -73,29 +76,30 @@ class ComputedEstimate:
 
 def compute_estimate(
     evidence: Evidence, seed: int, failures: PartialFailures | None = None
-) -> ComputedEstimate | None:
-    """Assess the tracks of a window; None if fewer than five people walk.
+) -> ComputedEstimate | Monitored | None:
+    """Assess the tracks of a window, or monitor them alone if that is enough.
+
+    None if fewer than five people walk.
 
     `failures` are those of the run so far; those of the assessment join them.
     """
     failures = failures or PartialFailures(evidence.camera_id)
     failed: list[PartialFailure] = []
-    site = site_of(evidence, failed)
+    site, limits = site_of(evidence, failed), limits_of(evidence)
+    window = TrackWindow(
+        trajectories=[track.trajectory for track in evidence.tracks],
+        unanswered=np.array([track.unanswered for track in evidence.tracks]),
+        before=evidence.before,
+    )
     try:
-        found = assess(
-            TrackWindow(
-                trajectories=[track.trajectory for track in evidence.tracks],
-                unanswered=np.array([track.unanswered for track in evidence.tracks]),
-                before=evidence.before,
-            ),
-            site,
-            replace(evidence.state, warm_start=begin_of(evidence)),
-            limits_of(evidence),
-            factors_of(evidence),
-            failed,
-        )
+        monitored = monitor(window, site, limits, failed)
     except TooFewTrajectoriesError:
         return None
+    if not is_full_estimate_due(evidence, monitored):
+        failures.take(monitored.failures)
+        return monitored
+    state = replace(evidence.state, warm_start=begin_of(evidence))
+    found = assess(monitored, site, state, limits, factors_of(evidence))
     failures.take(found.failures)
     seen = evidence.tracks[found.estimated.first :]
     averaged = _averaged(evidence, seen, seed, failures)

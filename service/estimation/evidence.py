@@ -16,12 +16,14 @@ from models.pose import link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory, end_key
 from models.walking.config import FEWEST_WALKERS
-from service.estimation.carried_state import carried_state
+from service.enums import PoseState
+from service.estimation.carried_state import carried_state, last_estimate
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows, zones
 from service.store.cameras import CameraRecord
+from service.store.estimates import EstimateRecord
 from service.store.look_budget import LookBudget
 from service.store.references import (
     AnchorRecord,
@@ -163,6 +165,19 @@ def anchor_of(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PreviousEstimate:
+    """The last full estimate against the same reference.
+
+    `new_tracks` of the window came after it; `has_new_input` is whether an image or a model did.
+    """
+
+    state: PoseState
+    moved: float
+    new_tracks: int
+    has_new_input: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
@@ -172,7 +187,8 @@ class Evidence:
     `moved_prior` is how likely a move is before any track. `before` is the piece before each of the
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
     estimate before ended, `picture` the result of the newest image. `zones` depend on the pose;
-    `state` is what earlier assessments and the operators' answers left.
+    `state` is what earlier assessments and the operators' answers left, `previous` the last full
+    estimate; `asked` is whether somebody asks for another one.
     """
 
     camera_id: str
@@ -197,10 +213,17 @@ class Evidence:
     zones: ZonesRecord | None = None
     frame_rate_hz: float | None = None
     state: AssessmentState = field(default_factory=AssessmentState)
+    previous: PreviousEstimate | None = None
+    asked: bool = False
 
 
 def load_evidence(
-    session: Session, settings: Settings, camera_id: str, unpacked: Unpacked | None = None
+    session: Session,
+    settings: Settings,
+    camera_id: str,
+    unpacked: Unpacked | None = None,
+    *,
+    asked: bool = False,
 ) -> Evidence | None:
     """The tracks to judge a camera by, and what else; None where there is nothing, or nothing new.
 
@@ -264,6 +287,25 @@ def load_evidence(
         zones=drawn,
         frame_rate_hz=camera.frame_rate_hz,
         state=carried_state(session, reference),
+        previous=_previous(last_estimate(session, reference), model, pks, picture),
+        asked=asked,
+    )
+
+
+def _previous(
+    last: EstimateRecord | None,
+    model: ModelRecord | None,
+    pks: Sequence[int],
+    picture: SeenPicture | None,
+) -> PreviousEstimate | None:
+    if last is None:
+        return None
+    other_model = last.model_id != (None if model is None else model.id)
+    return PreviousEstimate(
+        state=last.state,
+        moved=last.moved,
+        new_tracks=sum(pk > last.newest_track_pk for pk in pks),
+        has_new_input=other_model or (picture is not None and not picture.was_told(last)),
     )
 
 

@@ -49,7 +49,8 @@ from service.store.zones import ZonesRecord
 class CameraRecord(Record):
     """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
 
-    `looked_at_pk` is the newest track that an estimate job has looked at, whatever came of it.
+    `looked_at_pk` is the newest track that an estimation run has read, `checked_at` the time of
+    that run; `full_estimate_asked` is whether the next run is to be a full one.
     `estimate_tries` counts the looks since the last one that came to its end. If they fail,
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
     `estimate_after`. `lacks` says what failed beside the served estimate. A picture is asked of
@@ -78,6 +79,8 @@ class CameraRecord(Record):
     version: Mapped[int]
     estimate_due_at: Mapped[datetime | None]
     looked_at_pk: Mapped[int | None]
+    checked_at: Mapped[datetime | None]
+    full_estimate_asked: Mapped[bool] = mapped_column(default=False)
     estimate_tries: Mapped[int] = mapped_column(default=0)
     estimate_error: Mapped[str | None]
     estimate_failing_since: Mapped[datetime | None]

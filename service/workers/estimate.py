@@ -4,6 +4,7 @@ import logging
 import time
 from functools import partial
 
+from models.assessment import Monitored
 from models.effort import limited_effort
 from models.errors import CheckpointError
 from service.estimate_queue import (
@@ -16,7 +17,7 @@ from service.estimate_queue import (
     note_partial_failures,
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
-from service.estimation.compute import compute_estimate
+from service.estimation.compute import ComputedEstimate, compute_estimate
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Unpacked, load_evidence
 from service.estimation.growth import compute_growth, load_growth, save_growth
@@ -52,19 +53,29 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
             return
         # The mark "due" goes first: tracks that arrive from then on ask for a look of their own.
-        newest_pk = begin_look(session, camera_id)
+        newest_pk, asked = begin_look(session, camera_id)
         budget = budget_of(session, camera_id)
     try:
         with limited_effort(context.settings.estimate_cpu_s):
-            _look(context, camera_id, newest_pk, budget)
+            _look(context, camera_id, newest_pk, budget, asked=asked)
     except Exception as error:
         with context.store.write(camera_id) as session:
             fail_look(session, camera_id, repr(error))
         raise
 
 
-def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: LookBudget) -> None:
-    """Look at all tracks up to one. No transaction is open while anything is computed."""
+def _look(
+    context: JobContext,
+    camera_id: str,
+    newest_pk: int | None,
+    budget: LookBudget,
+    *,
+    asked: bool,
+) -> None:
+    """Estimate from all tracks up to one. No transaction is open while anything is computed.
+
+    Until a full estimate is due or `asked` for, new tracks update the monitor alone.
+    """
     store, settings = context.store, context.settings
     begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked(budget)
     if propose_if_uncalibrated(context, camera_id, unpacked):
@@ -79,13 +90,13 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
     learn_if_due(context, camera_id, unpacked)
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
-        evidence = load_evidence(session, settings, camera_id, unpacked)
+        evidence = load_evidence(session, settings, camera_id, unpacked, asked=asked)
     if left_out := left_out_by(budget):
         log.warning("tracks_left_out", extra={"camera_id": camera_id, **left_out[0].values})
         failures.reasons.extend(left_out)
     found = None if evidence is None else compute_estimate(evidence, settings.seed, failures)
     with store.write(camera_id) as session:
-        if evidence is not None and found is not None:
+        if evidence is not None and isinstance(found, ComputedEstimate):
             record = save_estimate(session, context.queue, settings, evidence, found)
             _log_estimate(record)
             if record is not None:
@@ -97,7 +108,8 @@ def _look(context: JobContext, camera_id: str, newest_pk: int | None, budget: Lo
         end_look(
             session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
         )
-    _grow_unless_failed(context, camera_id, unpacked)
+    if not isinstance(found, Monitored):
+        _grow_unless_failed(context, camera_id, unpacked)
 
 
 def _log_estimate(record: EstimateRecord | None) -> None:

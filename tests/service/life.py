@@ -133,7 +133,7 @@ class Life:
     def begin_look(self, camera_id: str) -> Look:
         """The job up to where it has read what it needs; a reference is learned on the way."""
         with self.store.write() as session:
-            newest_pk = begin_look(session, camera_id)
+            newest_pk, _ = begin_look(session, camera_id)
             period = load_reference_period(session, self.settings, camera_id)
             if period is not None and period.trajectories:
                 learned = CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=some_site())

@@ -141,14 +141,14 @@ def test_tracks_that_nothing_has_looked_at_are_looked_at(session, queue, setting
     assert found == ["tracks that nothing has looked at"]
     assert queue.estimates == ["corner"]
     assert reconciliation.reconcile_camera(session, queue, settings, "corner") == []
-    end_look(session, "corner", begin_look(session, "corner"))
+    end_look(session, "corner", begin_look(session, "corner")[0])
     assert reconciliation.reconcile_camera(session, queue, settings, "corner") == []
 
 
 def test_tracks_that_the_model_in_use_has_not_looked_at_are_looked_at(session, queue, settings):
     put_tracks(session, 5)
     publish(session, queue, settings)
-    end_look(session, "corner", begin_look(session, "corner"))  # by an older model, or none
+    end_look(session, "corner", begin_look(session, "corner")[0])  # by an older model, or none
     queue.estimates.clear()
     found = reconciliation.reconcile_camera(session, queue, settings, "corner")
     assert found == ["tracks that nothing has looked at"]
