@@ -272,7 +272,7 @@ class Settings(BaseSettings):
         5.0, gt=0, description="longest wait of a request for its turn, and for the store"
     )
     max_streams: int = Field(
-        200, ge=1, description="open streams of /events; a caller opens at most a quarter of them"
+        200, ge=1, description="open streams of /events; a caller has a quarter of these at most"
     )
     max_body_mb: float = Field(1.0, gt=0, description="MiB of a body")
     max_tracks_body_mb: float = Field(32.0, gt=0, description="MiB of a body with tracks")

@@ -171,7 +171,7 @@ def reseal(session: Session, old: Sealer, new: Sealer) -> int:
 
 
 def give_up_secrets(session: Session, new: Sealer) -> int:
-    """Replace secrets whose key is lost; returns how many.
+    """Replace secrets after the key was lost; returns how many.
 
     Webhooks get new secrets and are disabled; credentials of cameras are deleted.
     """

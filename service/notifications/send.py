@@ -72,7 +72,7 @@ def port_of(url: httpx.URL) -> int:
 def checked_addresses(
     host: str, port: int, allowed: Networks, setting: str = "SUREFOOT_WEBHOOK_ALLOW"
 ) -> list[str]:
-    """The addresses of a host, all of which are public or allowed by a setting.
+    """The addresses of a host; each is public or allowed by a setting.
 
     Raises:
         AddressError: it has none, or one of them may not be reached.

@@ -33,9 +33,9 @@ FORESEEN = (
 # Nothing of ours shows in a page of another origin, and no browser guesses at a type: JSON with
 # text that a tracker made up is no page.
 _OF_ALL = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin"}
-# Of answers whose route says nothing else: no browser and no proxy stores them.
+# The default of every route: no browser and no proxy stores the answer.
 _NOT_STORED = "no-store"
-_HIDDEN = ("snapshot_credentials", "password", "token")  # fields whose value no answer repeats
+_HIDDEN = ("snapshot_credentials", "password", "token")  # fields that no answer repeats
 # What a person can do about what a program reads in the detail.
 _FOR_PEOPLE = {
     403: N_(

@@ -47,7 +47,7 @@ async function ask() {
     }
   } catch (error) {
     if (!(error instanceof Refused)) throw error;
-    // Somebody else aims the same camera at this moment: what is shown is a second old.
+    // Another page aims the same camera at this moment; the aim that is shown is a second old.
     if (error.problem.code === "too_many_requests") return setTimeout(ask, EVERY_MS);
     root.dataset.state = "unknown";
     document.getElementById("aim-words").textContent = error.message;
