@@ -19,7 +19,6 @@ WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", 
 _ADDRESS = re.compile(r"[!-?A-~]+@[!-?A-~]+")  # of printable ASCII; what takes it knows the rest
 _UNITS_S = {"days": DAY_S, "hours": HOUR_S, "h": HOUR_S, "min": 60.0, "s": 1.0}
 _LONGEST_S, _LARGEST = 36_500 * DAY_S, 2**31 - 1
-_USER = re.compile(r"(?<=//)[^/@\s]*@")  # of a URL, with the password
 _MOST_WORKERS = 4  # unless more are asked for: each holds 240 MB
 
 
@@ -132,11 +131,6 @@ def read_camera_names(text: str) -> dict[str, str]:
             raise ValueError(f"name=camera-id, with commas, is needed, got {part!r:.80}")
         names[name] = camera_id
     return names
-
-
-def without_user(text: str) -> str:
-    """A text whose URLs tell neither a user nor a password."""
-    return _USER.sub("", text)
 
 
 def read_addresses(text: str) -> tuple[str, ...]:

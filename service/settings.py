@@ -59,7 +59,7 @@ class Settings(BaseSettings):
     secret_key: Annotated[str, values.readable(values.read_key)] | None = Field(
         None,
         repr=False,
-        description="32 bytes in base64 that seal webhooks' secrets; unset: secret.key in data_dir",
+        description="32 bytes in base64 that seal stored secrets; unset: secret.key in data_dir",
     )
     copy_before_migration: bool = Field(
         True, description="copy the database before its schema changes; without room: no start"
@@ -172,12 +172,11 @@ class Settings(BaseSettings):
         60.0, ge=1, description="minutes between pictures that are asked of a `snapshot_url`"
     )
     snapshot_allow: Networks = Field(
-        "", description="CIDRs, with commas, of private addresses that pictures may be asked of"
+        "", description="CIDRs, with commas, of private addresses that images may be fetched from"
     )
-    snapshot_user: str | None = Field(
-        None, description="sent where a camera of these asks for a user, by basic or digest"
+    snapshot_basic_http: bool = Field(
+        False, description="allow credentials of cameras by Basic over http, which is in clear"
     )
-    snapshot_password: str | None = Field(None, repr=False, description="and the password")
 
     webhook_allow: Networks = Field(
         "", description="CIDRs, with commas, of private addresses that webhooks may go to"
@@ -272,7 +271,9 @@ class Settings(BaseSettings):
     http_wait_s: float = Field(
         5.0, gt=0, description="longest wait of a request for its turn, and for the store"
     )
-    max_streams: int = Field(200, ge=1, description="open streams of /events")
+    max_streams: int = Field(
+        200, ge=1, description="open streams of /events; a caller has a quarter of these at most"
+    )
     max_body_mb: float = Field(1.0, gt=0, description="MiB of a body")
     max_tracks_body_mb: float = Field(32.0, gt=0, description="MiB of a body with tracks")
     max_snapshot_mb: float = Field(8.0, gt=0, description="MiB of a still image")
@@ -354,7 +355,7 @@ class Settings(BaseSettings):
 
     @property
     def snapshot_networks(self) -> tuple[IPv4Network | IPv6Network, ...]:
-        """Private networks that pictures may be asked of, and the password given to."""
+        """Private networks that images may be fetched from, and credentials sent to."""
         return values.read_networks(self.snapshot_allow)
 
     @property

@@ -13,7 +13,7 @@ from tests.conftest import ROOT
 
 # Rooms, from the ground up: a room may import those before it, and itself.
 SERVICE_ROOMS = [
-    {"data_dir", "interpreter", "setting_values", "enums", "degrees"},
+    {"data_dir", "interpreter", "setting_values", "addresses", "enums", "degrees"},
     {"settings", "errors", "logs", "reasons"},
     {"formats", "store"},
     {"wording", "job_queue"},

@@ -112,6 +112,8 @@ table(
     *optional(DateTime, "snapshot_due_at"),
     *optional(String, "snapshot_error"),
     *needed(DateTime, "created_at", "updated_at"),
+    *optional(String, "snapshot_credentials"),
+    *needed(Boolean, "snapshot_digest"),
 )
 table(
     "prior_poses",

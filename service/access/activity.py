@@ -5,8 +5,8 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from service.addresses import origin_of
 from service.enums import Activity, AlertKind, Outcome
-from service.setting_values import without_user
 from service.settings import Settings
 from service.store import journal
 from service.store.access import actor_of, address_of
@@ -65,13 +65,17 @@ def note(
 def note_settings(session: Session, settings: Settings) -> None:
     """Keep the settings that are no defaults, where they are others than at the last start.
 
-    Of a secret, that it is set; of a URL, no user and no password.
+    Secrets are kept as "set", addresses without user, path and query.
     """
     given = {
-        name: without_user(str(value)) if field.repr else "set"
+        name: _shown(str(value)) if field.repr else "set"
         for name, field in Settings.model_fields.items()
         if (value := getattr(settings, name)) != field.get_default(call_default_factory=True)
     }
     last = journal.newest_of_kind(session, Activity.SETTINGS_CHANGED)
     if given != ({} if last is None else last.details):
         note(session, Activity.SETTINGS_CHANGED, by=None, details=given)
+
+
+def _shown(value: str) -> str:
+    return origin_of(value) if "://" in value else value

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from sqlalchemy.orm import Session
 
 from service.access.activity import note
+from service.addresses import origin_of
 from service.enums import Activity, TokenScope
 from service.errors import ForbiddenError, MalformedError, NotFoundError
 from service.store import access
@@ -157,6 +158,17 @@ def caller_of(record: TokenRecord) -> Caller:
         cameras=None if record.cameras is None else frozenset(record.cameras),
         sources=None if record.sources is None else frozenset(record.sources),
     )
+
+
+def address_for(caller: Caller | None, url: str | None) -> str | None:
+    """A stored address as a caller sees it.
+
+    It is whole for `admin`, or if access control is off (`caller` is None); others see scheme,
+    host and port.
+    """
+    if url is None or caller is None or caller.may(TokenScope.ADMIN):
+        return url
+    return origin_of(url)
 
 
 def is_valid(record: TokenRecord, now: datetime) -> bool:

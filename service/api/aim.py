@@ -1,4 +1,4 @@
-"""`/cameras/{id}/aim`: where to turn a camera, asked each second by who stands on the ladder."""
+"""`/cameras/{id}/aim`: where to turn a camera, requested each second by the person who turns it."""
 
 import math
 from datetime import datetime
@@ -9,9 +9,10 @@ from pydantic import BaseModel
 
 from service.api.middleware.dependencies import BodyDep, StateDep, media_type_of
 from service.cameras.aiming import Aim, aim_by_people, aim_by_picture, aim_target
+from service.cameras.image_source import fetch_image
 from service.errors import MalformedError
 from service.formats.still import read_still
-from service.notifications.fetch import FetchError, fetch
+from service.notifications.fetch import FetchError
 
 router = APIRouter(prefix="/cameras/{camera_id}/aim", tags=["pose"])
 
@@ -51,11 +52,16 @@ _DESCRIBED_BODY = {
 }
 
 
+# Shorter than the wait for a turn, so that silent cameras delay the aim of another one only once.
+_FETCH_S = 4.0
+
+
 @router.post("", openapi_extra=_DESCRIBED_BODY)
 def show(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> AimOut:
-    """Where to turn the camera, by the picture that is sent, or is asked of its `snapshot_url`.
+    """Where to turn the camera, by the image that is sent or fetched from its `snapshot_url`.
 
-    Nothing of it is kept. Without a picture it is by the newest people.
+    The image is not kept. Without an image, the newest tracks are used. A camera has one such
+    request at a time.
     """
     settings = state.settings
     with state.store.read() as session:
@@ -66,7 +72,7 @@ def show(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> Ai
     media_type = media_type_of(request)
     if not body:
         try:
-            found = fetch(settings, str(target.snapshot_url))
+            found = fetch_image(state.store, settings, camera_id, state.image_hosts, _FETCH_S)
         except FetchError as error:
             raise MalformedError(f"snapshot_url: {error}") from error
         body, media_type = found.content, found.media_type

@@ -5,13 +5,21 @@ from datetime import datetime
 from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, Query, Response
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from models.geometry.intrinsics import Intrinsics
+from service.access.tokens import Caller, address_for
 from service.api.documented import ETAG
 from service.api.ignored import NamingRoute
 from service.api.labels import CameraName, Site, Tags, slug
-from service.api.middleware.dependencies import IfMatch, ReadDep, StateDep, WriteDep
+from service.api.middleware.dependencies import CallerDep, IfMatch, ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     Body,
     CameraId,
@@ -28,6 +36,7 @@ from service.api.schemas import (
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
 from service.enums import PoseState
+from service.notifications.fetch import Credentials
 from service.notifications.send import read_url
 from service.wording.typed_pose import judge_typed
 
@@ -39,7 +48,30 @@ def _checked_url(text: str) -> str:
 
 FrameRate = Annotated[Finite, Field(gt=0, le=1000)]
 SnapshotUrl = Annotated[str, AfterValidator(_checked_url)]
+_MOST_CREDENTIALS = 200
 ReferenceTracks = Annotated[int, Field(ge=5, le=100_000)]
+
+
+class CredentialsBody(Body):
+    """The user and password of a camera, by which its image is fetched. They are never returned."""
+
+    user: str
+    password: str
+
+    @field_validator("user", "password")
+    @classmethod
+    def _can_be_sent(cls, value: str, info: ValidationInfo) -> str:
+        if not 0 < len(value) <= _MOST_CREDENTIALS:
+            raise ValueError(f"1 to {_MOST_CREDENTIALS} characters are needed, got {len(value)}")
+        if not value.isprintable():
+            raise ValueError("printable characters on one line are needed")
+        if info.field_name == "user" and ":" in value:
+            raise ValueError("a user without a colon is needed")
+        return value
+
+    def to_value(self) -> Credentials:
+        """Credentials as a value."""
+        return Credentials(user=self.user, password=self.password)
 
 
 class WalkingSpeedBody(Body):
@@ -82,6 +114,7 @@ class CameraBody(_LensedBody):
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
     reference_tracks: ReferenceTracks = 200
     snapshot_url: SnapshotUrl | None = Field(None, description="a JPEG or PNG of now")
+    snapshot_credentials: CredentialsBody | None = Field(None, description="for `snapshot_url`")
 
     @model_validator(mode="after")
     def _has_lens(self) -> Self:
@@ -106,6 +139,7 @@ class CameraBody(_LensedBody):
             walking_speed_sd_mps=self.walking_speed.sd_mps,
             reference_tracks=self.reference_tracks,
             snapshot_url=self.snapshot_url,
+            snapshot_credentials=_credentials(self.snapshot_credentials),
             site=self.site,
             tags=self.tags,
         )
@@ -122,13 +156,22 @@ class CameraPatch(_LensedBody):
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
     reference_tracks: ReferenceTracks | None = None
-    snapshot_url: SnapshotUrl | Literal[""] | None = Field(None, description="empty: none")
+    snapshot_url: SnapshotUrl | Literal[""] | None = Field(
+        None, description="empty: none; another host or port deletes the credentials"
+    )
+    snapshot_credentials: CredentialsBody | Literal[""] | None = Field(
+        None, description="empty: none"
+    )
 
     @model_validator(mode="after")
     def _whole_pose(self) -> Self:
         if self.prior_pose is not None and self.prior_pose.measured:
             raise ValueError("prior_pose: a whole one is needed to change it")
         return self
+
+
+def _credentials(body: CredentialsBody | None) -> Credentials | None:
+    return None if body is None else body.to_value()
 
 
 class QuestionOut(Out):
@@ -139,7 +182,7 @@ class QuestionOut(Out):
 
 
 class CameraOut(Out):
-    """A registered camera."""
+    """A registered camera. Callers without `admin` see scheme and host of `snapshot_url` alone."""
 
     id: str
     name: str
@@ -151,6 +194,7 @@ class CameraOut(Out):
     walking_speed: WalkingSpeedBody
     reference_tracks: int
     snapshot_url: str | None
+    snapshot_credentials_set: bool
     snapshot_error: str | None
     state: PoseState
     reference: ReferenceOut
@@ -160,11 +204,13 @@ class CameraOut(Out):
     updated_at: datetime
 
     @classmethod
-    def from_value(cls, view: CameraView) -> Self:
-        """The body of a camera."""
+    def from_value(cls, view: CameraView, caller: Caller | None) -> Self:
+        """The body of a camera for a caller."""
         record = view.record
         return cls.of(
             record,
+            snapshot_url=address_for(caller, record.snapshot_url),
+            snapshot_credentials_set=record.snapshot_credentials is not None,
             intrinsics=IntrinsicsBody.model_validate(asdict(view.intrinsics)),
             prior_pose=PoseOut.from_value(view.prior_pose) if view.calibrated else None,
             walking_speed=WalkingSpeedBody(
@@ -183,11 +229,11 @@ class CameraAnswer(CameraOut):
     questions: list[QuestionOut]
 
     @classmethod
-    def from_value(cls, view: CameraView) -> Self:
-        """The body of a camera, with the remarks of the registration form on it."""
+    def from_value(cls, view: CameraView, caller: Caller | None) -> Self:
+        """The body of a camera, with the questions that the registration form asks about it."""
         # Of a pose that is assumed, what was measured may be a slip, too.
         asked = [QuestionOut.of(each) for each in judge_typed(view.intrinsics, view.prior_pose)]
-        return cls(**dict(CameraOut.from_value(view)), questions=asked)
+        return cls(**dict(CameraOut.from_value(view, caller)), questions=asked)
 
 
 class CameraPage(BaseModel):
@@ -202,7 +248,7 @@ router = APIRouter(prefix="/cameras", tags=["cameras"], route_class=NamingRoute)
 
 @router.post("", status_code=201, responses={201: {"headers": ETAG}})
 def register(
-    body: CameraBody, state: StateDep, session: WriteDep, response: Response
+    body: CameraBody, state: StateDep, session: WriteDep, caller: CallerDep, response: Response
 ) -> CameraAnswer:
     """Register a camera with its intrinsics and prior pose; queues its first training.
 
@@ -211,13 +257,14 @@ def register(
     view = cameras.register_camera(session, state.queue, state.settings, body.to_spec())
     response.headers["Location"] = f"/cameras/{view.record.id}"
     response.headers["ETag"] = view.etag
-    return CameraAnswer.from_value(view)
+    return CameraAnswer.from_value(view, caller)
 
 
 @router.get("")
 def list_all(
     state: StateDep,
     session: ReadDep,
+    caller: CallerDep,
     cursor: Text = "",
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     wanted: Annotated[
@@ -233,17 +280,19 @@ def list_all(
     )
     page = views[:limit]
     return CameraPage(
-        items=[CameraOut.from_value(view) for view in page],
+        items=[CameraOut.from_value(view, caller) for view in page],
         next_cursor=page[-1].record.id if len(views) > limit else None,
     )
 
 
 @router.get("/{camera_id}", responses={200: {"headers": ETAG}})
-def show(camera_id: str, state: StateDep, session: ReadDep, response: Response) -> CameraOut:
+def show(
+    camera_id: str, state: StateDep, session: ReadDep, caller: CallerDep, response: Response
+) -> CameraOut:
     """A camera, with the ETag that a change asks for."""
     view = cameras.view_camera(session, state.settings, camera_id)
     response.headers["ETag"] = view.etag
-    return CameraOut.from_value(view)
+    return CameraOut.from_value(view, caller)
 
 
 @router.patch("/{camera_id}", responses={200: {"headers": ETAG}})
@@ -252,6 +301,7 @@ def change(
     body: CameraPatch,
     state: StateDep,
     session: WriteDep,
+    caller: CallerDep,
     response: Response,
     if_match: IfMatch = None,
 ) -> CameraAnswer:
@@ -260,6 +310,7 @@ def change(
     `If-Match` is the ETag of the camera as it was read; without it the answer, 428, has it in
     `etag`, and so has that of a change made of an older version, 412.
     """
+    given = body.snapshot_credentials
     speed = {} if body.walking_speed is None else body.walking_speed.model_dump(exclude_unset=True)
     view = cameras.change_camera(
         session,
@@ -278,11 +329,12 @@ def change(
             walking_speed_sd_mps=speed.get("sd_mps"),
             reference_tracks=body.reference_tracks,
             snapshot_url=body.snapshot_url,
+            snapshot_credentials="" if given == "" else _credentials(given),
         ),
         body.by,
     )
     response.headers["ETag"] = view.etag
-    return CameraAnswer.from_value(view)
+    return CameraAnswer.from_value(view, caller)
 
 
 @router.delete("/{camera_id}", status_code=204)

@@ -18,6 +18,7 @@ from service.api.middleware.dependencies import (
     StateDep,
     WriteDep,
 )
+from service.api.middleware.pages import REVALIDATED
 from service.api.schemas import (
     POSE_FIELDS,
     Body,
@@ -281,7 +282,7 @@ def show(
     What each of the files holds and leaves out is in the guide to formats out.
     """
     view = poses.view_pose(session, state.settings, camera_id)
-    headers = {"ETag": view.etag}
+    headers = {"ETag": view.etag, **REVALIDATED}
     if if_none_match is not None and view.etag in map(str.strip, if_none_match.split(",")):
         return Response(status_code=304, headers=headers)
     if format_ is not None:

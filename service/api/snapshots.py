@@ -14,6 +14,7 @@ from service.api.middleware.dependencies import (
     WritesDep,
     media_type_of,
 )
+from service.api.middleware.pages import REVALIDATED
 from service.api.schemas import Moment, Out
 from service.cameras import cameras, snapshots
 from service.formats.still import Still, read_still
@@ -83,9 +84,9 @@ def show(
 
 
 def jpeg_answer(jpeg: bytes, if_none_match: str | None) -> Response:
-    """The answer with an image that nobody in between keeps; 304 to who has it."""
+    """The answer with an image that only the caller's browser keeps; 304 if it has it."""
     digest = hashlib.sha256(jpeg).hexdigest()
-    headers = {"ETag": f'"{digest}"', "Cache-Control": "private, no-cache"}
+    headers = {"ETag": f'"{digest}"', **REVALIDATED}
     if if_none_match == headers["ETag"]:
         return Response(status_code=304, headers=headers)
     return Response(jpeg, media_type="image/jpeg", headers=headers)

@@ -74,7 +74,6 @@ def create(body: TokenBody, session: WriteDep, response: Response) -> TokenMade:
     spec = TokenSpec(**body.model_dump())
     made = tokens.make_token(session, spec, name_in(session, None))
     response.headers["Location"] = "/tokens"
-    response.headers["Cache-Control"] = "no-store"
     return TokenMade.from_record(made.record, token=made.text)
 
 

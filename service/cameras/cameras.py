@@ -5,7 +5,7 @@ import secrets
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
@@ -15,6 +15,7 @@ from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
 from service.cameras.held_poses import held_pose, keep_drawn
+from service.cameras.image_source import set_image_source
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import Activity, AlertState, Origin, Outcome, PoseState
@@ -27,6 +28,7 @@ from service.errors import (
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
 from service.notifications.events import tell_of_camera
+from service.notifications.fetch import Credentials
 from service.references import begin_reference
 from service.settings import Settings
 from service.store import cameras, references, tracks
@@ -53,6 +55,7 @@ class CameraSpec:
     walking_speed_sd_mps: float
     reference_tracks: int
     snapshot_url: str | None = None
+    snapshot_credentials: Credentials | None = None
     site: str = ""
     tags: Sequence[str] = ()
 
@@ -71,6 +74,10 @@ class CameraChange:
     walking_speed_sd_mps: float | None = None
     reference_tracks: int | None = None
     snapshot_url: str | None = None
+    snapshot_credentials: Credentials | Literal[""] | None = None
+
+
+_SEPARATE = ("intrinsics", "prior_pose", "snapshot_url", "snapshot_credentials")  # not as they come
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +131,6 @@ def register_camera(
         walking_speed_mean_mps=spec.walking_speed_mean_mps,
         walking_speed_sd_mps=spec.walking_speed_sd_mps,
         reference_tracks=spec.reference_tracks,
-        snapshot_url=spec.snapshot_url,
         version=1,
         estimate_due_at=None,
         looked_at_pk=None,
@@ -133,6 +139,7 @@ def register_camera(
         created_at=now,
         updated_at=now,
     )
+    set_image_source(record, settings, spec.snapshot_url, spec.snapshot_credentials)
     session.add(record)
     session.flush()
     if spec.prior_pose is None:
@@ -219,12 +226,10 @@ def change_camera(
     lens = {} if change.intrinsics is None else _columns(change.intrinsics)
     size = record.width, record.height
     for name, value in {**changed, **lens}.items():
-        if name not in ("intrinsics", "prior_pose"):
+        if name not in _SEPARATE:
             setattr(record, name, value)
     record.name, record.site = record.name or record.id, record.site or None
-    if change.snapshot_url is not None:
-        record.snapshot_url = change.snapshot_url or None
-        record.snapshot_due_at = record.snapshot_error = None
+    set_image_source(record, settings, change.snapshot_url, change.snapshot_credentials)
     record.version += 1
     record.updated_at = datetime.now(UTC)
     reference = references.newest(session, camera_id)

@@ -45,7 +45,7 @@ def backup(
     if manifest.key == "environment":
         echo(f"Keep SUREFOOT_SECRET_KEY (id {manifest.key_id}) elsewhere: it is not in there.")
     elif manifest.key == "archive":
-        echo("The key of webhooks' secrets is in there: keep it as safe as the service itself.")
+        echo("The key of the stored secrets is in there: keep it as safe as the service itself.")
     if manifest.missing_weights:
         echo(f"{len(manifest.missing_weights)} weights were missing: see `surefoot check`.")
 
@@ -98,7 +98,8 @@ def rotate_key(
         Path | None, typer.Option(help="Of the key until now; secret.key of the data directory.")
     ] = None,
     lost: Annotated[
-        bool, typer.Option("--lost", help="There is none: new secrets, webhooks disabled.")
+        bool,
+        typer.Option("--lost", help="It is lost: new webhook secrets, no camera credentials."),
     ] = False,
 ) -> None:
     """Seal the stored secrets with a new key file, or with SUREFOOT_SECRET_KEY if that is set."""
@@ -114,7 +115,7 @@ def _begin_on_file(data_dir: Path | None, command: str) -> "Settings":
     if settings.database_url is not None:
         raise StartError(
             f"{command}: it is for SQLite files, and SUREFOOT_DATABASE_URL names a server; use its "
-            "own tools (pg_dump, pg_restore, pg_amcheck), and keep the key of the webhooks' secrets"
+            "own tools (pg_dump, pg_restore, pg_amcheck), and keep the key of the stored secrets"
         )
     return settings
 

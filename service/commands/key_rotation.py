@@ -17,10 +17,10 @@ from service.store.engines.store import Store
 
 
 def rotate_key(settings: Settings, old_key_file: Path | None, *, lost: bool = False) -> int:
-    """Seal by SUREFOOT_SECRET_KEY, or by a key file that is made anew; returns how many secrets.
+    """Seal by SUREFOOT_SECRET_KEY, or by a new key file; returns how many secrets.
 
-    Nothing may use the data directory, whose own key file is the old one if none is named. Where it
-    is `lost`, webhooks get new secrets and are disabled.
+    Nothing may use the data directory. Its own key file is the old one if none is named. If the old
+    key is `lost`, webhooks get new secrets and are disabled, and cameras have no credentials.
 
     Raises:
         StartError: something uses it, or the old key does not open what is stored.

@@ -1,20 +1,56 @@
-"""One picture asked of a camera: from a checked address, within a deadline and a size."""
+"""Requests for the image of a camera: to one checked address, within bounds of time and size."""
 
 import time
-from collections.abc import Generator, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, field
 
 import httpcore
 import httpx
 
-from service.notifications.send import AddressError, CheckedBackend, Networks, read_url, tls_context
+from service.addresses import origin_of
+from service.notifications.host_backoff import HostBackoff
+from service.notifications.send import (
+    AddressError,
+    CheckedBackend,
+    checked_addresses,
+    may_reach,
+    port_of,
+    read_url,
+    tls_context,
+)
 from service.settings import Settings
 
-_DEADLINE_S = 15.0
+DEADLINE_S = 15.0
+_TIMEOUTS_S = dict(connect=3.0, read=5.0, write=5.0)  # of each wait
+_SETTING = "SUREFOOT_SNAPSHOT_ALLOW"
 
 
 class FetchError(Exception):
-    """Why no picture came; the message has what was asked for and what came."""
+    """No image came; the message has the limit and the value received.
+
+    `retry_after_s` is set if the host was not asked at all, because it did not answer before.
+    """
+
+    def __init__(self, message: str, retry_after_s: float | None = None) -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Credentials:
+    """The user and password of a camera."""
+
+    user: str
+    password: str = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageSource:
+    """The address of a camera's image. With `digest_only`, Basic is refused."""
+
+    url: str
+    credentials: Credentials | None = None
+    digest_only: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,73 +61,138 @@ class Fetched:
     media_type: str
 
 
-def fetch(settings: Settings, url: str) -> Fetched:
-    """The picture at a URL; with the user and password of the settings where they are asked for.
+def fetch(
+    settings: Settings,
+    source: ImageSource,
+    hosts: HostBackoff,
+    on_digest: Callable[[], None],
+    within_s: float = DEADLINE_S,
+) -> Fetched:
+    """The image at an address.
 
-    These go to networks of `SUREFOOT_SNAPSHOT_ALLOW` alone.
+    The host is resolved once. All requests go to the addresses that were checked then.
+
+    Args:
+        settings: networks that may be reached, and limits.
+        source: the address, and the credentials of its camera.
+        hosts: hosts that are not asked for a while.
+        on_digest: called before the first answer to a request for Digest.
+        within_s: deadline of all requests together.
 
     Raises:
-        FetchError: it may not be reached, does not answer in time, or with no picture.
+        FetchError: the address may not be reached, or no image came in time.
     """
-    networks, most = settings.snapshot_networks, int(settings.max_snapshot_mb * 2**20)
-    end_s = time.monotonic() + _DEADLINE_S
+    if wait_s := hosts.left_s(source.url):
+        raise FetchError(
+            f"{origin_of(source.url)} did not answer; the next request is in {wait_s:.0f} s", wait_s
+        )
     try:
-        read_url(url)
-        with httpx.Client(transport=_Checked(networks, end_s), timeout=_DEADLINE_S) as client:
-            try:
-                return _read(client, url, most, auth=None)
-            except _Asked as asked:
-                auth = _auth(settings, asked.scheme)
-        # Whoever asks for a password gets it within what is allowed alone, and nowhere else.
-        inside = _Checked(networks, end_s, public=False)
-        with httpx.Client(transport=inside, timeout=_DEADLINE_S) as client:
-            return _read(client, url, most, auth)
-    except AddressError as error:
-        raise FetchError(f"snapshot_url: {error}") from error
-    except _Asked as asked:
-        user = settings.snapshot_user
-        raise FetchError(f"{asked.scheme} with the user {user} is refused") from None
-    except (httpcore.TimeoutException, httpx.TimeoutException) as error:
-        raise FetchError(f"no whole picture within {_DEADLINE_S:g} s") from error
-    except (httpx.HTTPError, httpcore.NetworkError, httpcore.ProtocolError, OSError) as error:
+        found = _fetch(settings, source, on_digest, time.monotonic() + within_s)
+    except _UNANSWERED as error:
+        hosts.failed(source.url)
+        if isinstance(error, httpcore.TimeoutException):
+            limits = ", ".join(f"{name} {each:g} s" for name, each in _TIMEOUTS_S.items())
+            raise FetchError(f"no whole image within {within_s:g} s ({limits})") from error
         raise FetchError(f"{type(error).__name__}: {error}") from error
+    except AddressError as error:  # a slow resolver is not asked each time either
+        hosts.failed(source.url)
+        raise FetchError(str(error)) from error
+    except FetchError:
+        hosts.answered(source.url)
+        raise
+    hosts.answered(source.url)
+    return found
+
+
+_UNANSWERED = (
+    httpcore.TimeoutException,
+    httpcore.NetworkError,
+    httpcore.ProtocolError,
+    httpx.HTTPError,
+    OSError,
+)
+
+
+def _fetch(
+    settings: Settings, source: ImageSource, on_digest: Callable[[], None], end_s: float
+) -> Fetched:
+    url, networks = read_url(source.url), settings.snapshot_networks
+    addresses = checked_addresses(url.host, port_of(url), networks, _SETTING)
+    backend = CheckedBackend(lambda *_: addresses, lambda: end_s - time.monotonic())
+    most = int(settings.max_snapshot_mb * 2**20)
+    with httpx.Client(transport=_Transport(backend)) as client:
+        try:
+            return _read(client, source.url, most, auth=None)
+        except _AskedError as asked:
+            scheme = asked.scheme
+        outside = [each for each in addresses if not may_reach(each, networks, public=False)]
+        if outside:
+            raise FetchError(
+                f"asks for credentials ({scheme}), which are only sent to networks that {_SETTING} "
+                f"names, got {outside[0]}"
+            )
+        auth = _auth(settings, source, scheme)
+        if scheme == "digest" and not source.digest_only:
+            on_digest()
+        try:
+            return _read(client, source.url, most, auth)
+        except _AskedError as asked:
+            raise FetchError(
+                f"rejects the user and password of snapshot_credentials ({asked.scheme})"
+            ) from None
+
+
+def _auth(settings: Settings, source: ImageSource, scheme: str) -> httpx.Auth:
+    if scheme not in ("digest", "basic"):
+        raise FetchError(f"asks for {scheme!r:.40}; only Digest and Basic are supported")
+    if source.credentials is None:
+        raise FetchError(f"asks for credentials ({scheme}): set the camera's snapshot_credentials")
+    user, password = source.credentials.user, source.credentials.password
+    if scheme == "digest":
+        return _Digest(user, password)
+    if source.digest_only:
+        raise FetchError(
+            "asks for Basic, but has asked for Digest before; if the camera was replaced, clear "
+            "its snapshot_url and set it again"
+        )
+    if not source.url.lower().startswith("https:") and not settings.snapshot_basic_http:
+        raise FetchError(
+            "asks for Basic over http, which sends the password in clear: use Digest or https, or "
+            "set SUREFOOT_SNAPSHOT_BASIC_HTTP=true"
+        )
+    return httpx.BasicAuth(user, password)
 
 
 class _Digest(httpx.DigestAuth):
-    """Digest; a challenge of a form that httpx does not know is an error of its own kind here."""
+    """Digest that reports an unsupported challenge as a `FetchError`."""
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
-        """The requests that it takes."""
+        """The requests that authentication takes."""
         try:
             yield from super().auth_flow(request)
         except (KeyError, ValueError, NotImplementedError) as error:
-            raise FetchError(f"it asks for a digest of an unknown form: {error}") from error
+            raise FetchError(f"asks for Digest in an unsupported form: {error}") from error
 
 
-class _Asked(Exception):
-    """An answer that asks for a user and password, in a scheme."""
+class _AskedError(Exception):
+    """The answer asks for credentials in a scheme."""
 
     def __init__(self, scheme: str) -> None:
         super().__init__(scheme)
         self.scheme = scheme
 
 
-def _auth(settings: Settings, scheme: str) -> httpx.Auth:
-    user, password = settings.snapshot_user, settings.snapshot_password
-    if user is None or password is None:
-        raise FetchError(f"it asks for a user ({scheme}): set SUREFOOT_SNAPSHOT_USER, _PASSWORD")
-    if scheme == "digest":
-        return _Digest(user, password)
-    if scheme == "basic":
-        return httpx.BasicAuth(user, password)
-    raise FetchError(f"it asks for {scheme!r:.40}; basic and digest are known")
+def _scheme(answer: httpx.Response) -> str:
+    """The scheme that an answer asks for: Digest if it is one of several."""
+    asked = [each.split() for each in answer.headers.get_list("www-authenticate")]
+    schemes = [words[0].lower() for words in asked if words]
+    return "digest" if "digest" in schemes else next(iter(schemes), "nothing")
 
 
 def _read(client: httpx.Client, url: str, most: int, auth: httpx.Auth | None) -> Fetched:
     with client.stream("GET", url, auth=auth, headers={"User-Agent": "surefoot"}) as answer:
         if answer.status_code == httpx.codes.UNAUTHORIZED:
-            words = answer.headers.get("www-authenticate", "").split()
-            raise _Asked(words[0].lower() if words else "nothing")
+            raise _AskedError(_scheme(answer))
         if answer.status_code != httpx.codes.OK:
             raise FetchError(f"answered {answer.status_code}")
         content = bytearray()
@@ -105,19 +206,11 @@ def _read(client: httpx.Client, url: str, most: int, auth: httpx.Auth | None) ->
         )
 
 
-class _Checked(httpx.BaseTransport):
-    """Requests to addresses that are checked as they are connected to; one connection each."""
+class _Transport(httpx.BaseTransport):
+    """Requests by the connections of a backend."""
 
-    def __init__(self, networks: Networks, end_s: float, *, public: bool = True) -> None:
-        self._pool = httpcore.ConnectionPool(
-            ssl_context=tls_context(),
-            network_backend=CheckedBackend(
-                networks,
-                lambda: end_s - time.monotonic(),
-                setting="SUREFOOT_SNAPSHOT_ALLOW",
-                public=public,
-            ),
-        )
+    def __init__(self, backend: CheckedBackend) -> None:
+        self._pool = httpcore.ConnectionPool(ssl_context=tls_context(), network_backend=backend)
 
     def handle_request(self, request: httpx.Request) -> httpx.Response:
         """The answer to a request, its body unread."""
@@ -132,6 +225,7 @@ class _Checked(httpx.BaseTransport):
                 ),
                 headers=request.headers.raw,
                 content=request.stream,
+                extensions={"timeout": _TIMEOUTS_S},
             )
         )
         return httpx.Response(

@@ -19,7 +19,8 @@ from service.data_dir import KEY_FILE, StartError, sync_folder, telling_of
 from service.reasons import ServiceCode
 from service.setting_values import read_key
 from service.settings import Settings
-from service.store import webhooks
+from service.store import cameras, webhooks
+from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
 from service.store.webhooks import WebhookRecord
 
@@ -122,12 +123,12 @@ def new_secret() -> str:
 def secret_of(settings: Settings, record: WebhookRecord, *, old: bool = False) -> str | None:
     """A webhook's secret in plain text, or that of before the last rotation; None without any."""
     stored = record.old_secret if old else record.secret
-    return None if stored is None else sealer_of(settings).open(stored, _purpose(record.id))
+    return None if stored is None else sealer_of(settings).open(stored, _webhook_purpose(record.id))
 
 
 def sealed_secret(settings: Settings, webhook_id: str, secret: str) -> str:
     """The secret of a webhook as it is stored."""
-    return sealer_of(settings).seal(secret, _purpose(webhook_id))
+    return sealer_of(settings).seal(secret, _webhook_purpose(webhook_id))
 
 
 def settle_key(settings: Settings) -> None:
@@ -162,26 +163,28 @@ def reseal(session: Session, old: Sealer, new: Sealer) -> int:
     Raises:
         StartError: the old key does not open one of them.
     """
-    count = 0
-    for record in webhooks.every(session):
-        for name in ("secret", "old_secret"):
-            text = getattr(record, name)
-            if text is not None:
-                plain = old.open(text, _purpose(record.id))
-                setattr(record, name, new.seal(plain, _purpose(record.id)))
-                count += 1
-    return count
+    found = _sealed(session)
+    for each in found:
+        plain = old.open(each.text, each.purpose)
+        setattr(each.record, each.column, new.seal(plain, each.purpose))
+    return len(found)
 
 
 def give_up_secrets(session: Session, new: Sealer) -> int:
-    """Give all webhooks that have a secret another one, and disable them; returns how many."""
+    """Replace secrets after the key was lost; returns how many.
+
+    Webhooks get new secrets and are disabled; credentials of cameras are deleted.
+    """
     count = 0
-    for record in webhooks.every(session):
-        if record.secret is not None:
-            record.secret = new.seal(new_secret(), _purpose(record.id))
-            record.old_secret = None
-            record.disable(Reason(code=ServiceCode.SECRET_LOST))
+    for hook in webhooks.every(session):
+        if hook.secret is not None:
+            hook.secret = new.seal(new_secret(), _webhook_purpose(hook.id))
+            hook.old_secret = None
+            hook.disable(Reason(code=ServiceCode.SECRET_LOST))
             count += 1
+    for camera in cameras.with_credentials(session):
+        camera.snapshot_credentials = None
+        count += 1
     return count
 
 
@@ -190,13 +193,13 @@ def require_openable(sealer: Sealer, stored: Sequence[tuple[str, str]]) -> None:
 
     Args:
         sealer: with the key.
-        stored: ids of webhooks and their secrets as they are stored.
+        stored: purposes, and the secrets that are sealed for them.
 
     Raises:
         StartError: it does not open one.
     """
-    for webhook_id, text in stored:
-        sealer.open(text, _purpose(webhook_id))
+    for purpose, text in stored:
+        sealer.open(text, purpose)
 
 
 def _end_rotation(settings: Settings, sealed: list[str]) -> None:
@@ -222,15 +225,43 @@ def _check_file_or_environment(settings: Settings, sealed: list[str]) -> None:
 
 
 def _stored_secrets(settings: Settings) -> list[tuple[str, str]]:
-    """The ids of webhooks with their secrets as they are stored."""
+    """The purposes of all secrets, with the sealed secrets."""
     with contextlib.closing(Store(settings)) as store, store.read() as session:
-        return [
-            (record.id, text)
-            for record in webhooks.every(session)
-            for text in (record.secret, record.old_secret)
-            if text is not None
-        ]
+        return [(each.purpose, each.text) for each in _sealed(session)]
 
 
-def _purpose(webhook_id: str) -> str:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sealed:
+    """A column of a record that is sealed for a purpose."""
+
+    record: WebhookRecord | CameraRecord
+    column: str
+    purpose: str
+
+    @property
+    def text(self) -> str:
+        """The sealed secret."""
+        return str(getattr(self.record, self.column))
+
+
+def _sealed(session: Session) -> list[_Sealed]:
+    """All secrets that are stored; `files.sealed_secrets` reads the same from a file."""
+    hooks = [
+        _Sealed(record=record, column=column, purpose=_webhook_purpose(record.id))
+        for record in webhooks.every(session)
+        for column in ("secret", "old_secret")
+        if getattr(record, column) is not None
+    ]
+    return hooks + [
+        _Sealed(record=record, column="snapshot_credentials", purpose=camera_purpose(record.id))
+        for record in cameras.with_credentials(session)
+    ]
+
+
+def _webhook_purpose(webhook_id: str) -> str:
     return f"webhook {webhook_id}"
+
+
+def camera_purpose(camera_id: str) -> str:
+    """The purpose that the credentials of a camera are sealed for."""
+    return f"camera {camera_id}"

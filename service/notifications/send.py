@@ -2,8 +2,8 @@
 
 Private addresses only where the operator allows them. The check is on addresses that a name
 resolves to, never on how the name is spelt, so `http://2130706433/` is seen as 127.0.0.1. It is
-made when a webhook is created and again at each connection, which goes to the very address that
-was checked: a name that changes between check and connection gains nothing.
+made when a webhook is created and again before each request, which connects to the very address
+that was checked: a resolver that changes its answer between check and connection gains nothing.
 """
 
 import email.utils
@@ -60,19 +60,19 @@ def check_url(text: str, allowed: Networks) -> httpx.URL:
         AddressError: it is no plain http or https URL, or leads where it must not.
     """
     url = read_url(text)
-    checked_addresses(url.host, url.port or _PORTS[url.scheme], allowed)
+    checked_addresses(url.host, port_of(url), allowed)
     return url
 
 
+def port_of(url: httpx.URL) -> int:
+    """The port of a URL, or that of its scheme."""
+    return url.port or _PORTS[url.scheme]
+
+
 def checked_addresses(
-    host: str,
-    port: int,
-    allowed: Networks,
-    setting: str = "SUREFOOT_WEBHOOK_ALLOW",
-    *,
-    public: bool = True,
+    host: str, port: int, allowed: Networks, setting: str = "SUREFOOT_WEBHOOK_ALLOW"
 ) -> list[str]:
-    """The addresses of a host, all of which may be reached: by a setting, or as `public` ones.
+    """The addresses of a host; each is public or allowed by a setting.
 
     Raises:
         AddressError: it has none, or one of them may not be reached.
@@ -83,11 +83,10 @@ def checked_addresses(
         raise AddressError(f"the host {host!r} does not resolve: {error}") from error
     addresses = list(dict.fromkeys(str(entry[4][0]) for entry in found))
     for address in addresses:
-        if not may_reach(address, allowed, public=public):
+        if not may_reach(address, allowed):
             ranges = ", ".join(str(network) for network in allowed) or "none"
             raise AddressError(
-                f"the host {host!r} resolves to {address}, which is "
-                f"{'private or reserved' if public else 'sent no password'}; "
+                f"the host {host!r} resolves to {address}, which is private or reserved; "
                 f"{setting} names those that may be reached: {ranges}"
             )
     return addresses
@@ -180,7 +179,9 @@ def _exchange(
     target = httpcore.URL(
         scheme=parsed.raw_scheme, host=parsed.raw_host, port=parsed.port, target=parsed.raw_path
     )
-    backend = CheckedBackend(allowed, lambda: deadline_s - time.monotonic())
+    backend = CheckedBackend(
+        partial(checked_addresses, allowed=allowed), lambda: deadline_s - time.monotonic()
+    )
     with (
         httpcore.ConnectionPool(ssl_context=tls_context(), network_backend=backend) as pool,
         pool.stream("POST", target, headers=sent, content=content) as answer,
@@ -197,17 +198,17 @@ def _exchange(
 
 
 class CheckedBackend(httpcore.NetworkBackend):
-    """Connects to addresses that were checked in the same breath; all within one deadline."""
+    """Connects to checked addresses of a host, within one deadline.
+
+    Args:
+        addresses: the checked addresses of a host and port; no name is resolved but by this.
+        left_s: seconds until the deadline of everything together.
+    """
 
     def __init__(
-        self,
-        allowed: Networks,
-        left_s: Callable[[], float],
-        *,
-        setting: str = "SUREFOOT_WEBHOOK_ALLOW",
-        public: bool = True,
+        self, addresses: Callable[[str, int], Sequence[str]], left_s: Callable[[], float]
     ) -> None:
-        self._check = partial(checked_addresses, allowed=allowed, setting=setting, public=public)
+        self._addresses = addresses
         self._left_s = left_s
         self._plain = httpcore.SyncBackend()
 
@@ -221,10 +222,10 @@ class CheckedBackend(httpcore.NetworkBackend):
     ) -> httpcore.NetworkStream:
         """A connection to the first address of a host that answers."""
         failed: Exception | None = None
-        for address in self._check(host, port):
+        for address in self._addresses(host, port):
             try:
                 stream = self._plain.connect_tcp(
-                    address, port, _left(self._left_s), local_address, socket_options
+                    address, port, _left(self._left_s, timeout), local_address, socket_options
                 )
             except (httpcore.ConnectError, httpcore.ConnectTimeout) as error:
                 failed = error
@@ -243,11 +244,11 @@ class DeadlineStream(httpcore.NetworkStream):
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
         """Some bytes."""
-        return self._inner.read(max_bytes, _left(self._left_s))
+        return self._inner.read(max_bytes, _left(self._left_s, timeout))
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         """Send bytes."""
-        self._inner.write(buffer, _left(self._left_s))
+        self._inner.write(buffer, _left(self._left_s, timeout))
 
     def close(self) -> None:
         """Close the connection."""
@@ -260,7 +261,7 @@ class DeadlineStream(httpcore.NetworkStream):
         timeout: float | None = None,
     ) -> httpcore.NetworkStream:
         """The same in TLS; the certificate must be of the name, whatever address it has."""
-        inner = self._inner.start_tls(ssl_context, server_hostname, _left(self._left_s))
+        inner = self._inner.start_tls(ssl_context, server_hostname, _left(self._left_s, timeout))
         return DeadlineStream(inner, self._left_s)
 
     def get_extra_info(self, info: str) -> Any:
@@ -268,11 +269,12 @@ class DeadlineStream(httpcore.NetworkStream):
         return self._inner.get_extra_info(info)
 
 
-def _left(left_s: Callable[[], float]) -> float:
+def _left(left_s: Callable[[], float], timeout: float | None) -> float:
+    """Seconds that one wait may take: its own timeout, if any, but no longer than the deadline."""
     left = left_s()
     if left <= 0:
         raise httpcore.ReadTimeout("the deadline has passed")
-    return left
+    return left if timeout is None else min(left, timeout)
 
 
 def _seconds(text: str) -> float | None:

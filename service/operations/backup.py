@@ -210,7 +210,7 @@ def _copy_weights(settings: Settings, scratch: Path) -> list[str]:
 
 def _describe(settings: Settings, scratch: Path, missing: list[str]) -> Manifest:
     database = scratch / DATABASE
-    secrets = files.webhook_secrets(database)
+    secrets = files.sealed_secrets(database)
     key, key_id = "none", ""
     if settings.secret_key is not None or (settings.data_dir / KEY_FILE).exists() or secrets:
         sealer = sealer_of(settings)

@@ -135,7 +135,7 @@ def _broken_models(settings: Settings) -> dict[str, str]:
 
 
 def _key(settings: Settings, path: Path) -> Finding:
-    secrets = files.webhook_secrets(path)
+    secrets = files.sealed_secrets(path)
     try:
         if secrets:
             require_openable(sealer_of(settings), secrets)

@@ -162,7 +162,7 @@ def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Pr
         path = weights_path(folder / WEIGHTS, digest)
         if not path.exists() or hash_file(path).sha256 != digest:
             raise StartError(f"restore: weights {digest} of the backup are missing or damaged")
-    secrets = files.webhook_secrets(database)
+    secrets = files.sealed_secrets(database)
     if secrets:
         in_archive = (folder / KEY_FILE).exists()
         if not in_archive and settings.secret_key is None:

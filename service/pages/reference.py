@@ -8,7 +8,6 @@ from fastapi.responses import HTMLResponse
 
 from service.api.middleware.dependencies import StateDep
 from service.api.middleware.pages import VIEWER_SCRIPT_URL, VIEWER_STYLE_URL, render
-from service.setting_values import without_user
 from service.settings import Settings
 from service.wording.glossary import WORDS
 
@@ -51,7 +50,7 @@ def _said(value: Any) -> str:
         return _UNSET
     if isinstance(value, bool):
         return str(value).lower()
-    return without_user(f"{value:g}" if isinstance(value, float) else str(value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 router = APIRouter(include_in_schema=False)

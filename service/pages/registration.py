@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from models.durations import DAY_S
 from models.geometry.usual_pose import usual_pose
 from service.api.cameras import CameraOut
-from service.api.middleware.dependencies import BodyDep, StateDep, WriteDep
+from service.api.middleware.dependencies import BodyDep, CallerDep, StateDep, WriteDep
 from service.api.middleware.pages import render
 from service.api.schemas import Body, Finite, Triple
 from service.cameras import cameras
@@ -198,10 +198,13 @@ def tracks(
 
 
 @router.post("/ui/register", status_code=201)
-def register(body: RegistrationForm, state: StateDep, session: WriteDep) -> CameraOut:
+def register(
+    body: RegistrationForm, state: StateDep, session: WriteDep, caller: CallerDep
+) -> CameraOut:
     """Register a camera by the form; the same as `POST /cameras`."""
     spec = body.to_body().to_spec()
-    return CameraOut.from_value(cameras.register_camera(session, state.queue, state.settings, spec))
+    view = cameras.register_camera(session, state.queue, state.settings, spec)
+    return CameraOut.from_value(view, caller)
 
 
 def _say(number: float) -> str:

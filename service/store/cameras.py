@@ -56,6 +56,8 @@ class CameraRecord(Record):
     `estimate_after`. `lacks` says what failed beside the served estimate. A picture is asked of
     `snapshot_url` at `snapshot_due_at`, at once where that is None; `snapshot_error` is why the
     last one did not come. `site` is a path, None where nobody has said one.
+    `snapshot_credentials` are sealed with the data directory's key. `snapshot_digest` is set once
+    the host of `snapshot_url` has asked for Digest.
     """
 
     __tablename__ = "cameras"
@@ -91,6 +93,8 @@ class CameraRecord(Record):
     snapshot_error: Mapped[str | None]
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
+    snapshot_credentials: Mapped[str | None]
+    snapshot_digest: Mapped[bool] = mapped_column(default=False)
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -362,22 +366,44 @@ def failing(session: Session, besides: Collection[str] = ()) -> Sequence[CameraR
     ).all()
 
 
-def snapshots_due(
-    session: Session, now: datetime, every: timedelta, most: int
-) -> list[tuple[str, str]]:
-    """Cameras of whom a picture is due, and where it is asked for; the longest due first.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DueImage:
+    """An image that is due. `answers`: the camera sent one when it was last asked."""
 
-    One that would be due in more than twice `every` was before a clock was set back.
+    camera_id: str
+    url: str
+    answers: bool
+
+
+def snapshots_due(session: Session, now: datetime, every: timedelta) -> list[DueImage]:
+    """Images that are due: first of cameras that answer, then the longest due.
+
+    A time beyond twice `every` from now was set before the clock was set back.
     """
     at = CameraRecord.snapshot_due_at
     due = or_(at.is_(None), at <= now, at > now + 2 * every)
     rows = session.execute(
-        select(CameraRecord.id, CameraRecord.snapshot_url)
+        select(CameraRecord.id, CameraRecord.snapshot_url, at, CameraRecord.snapshot_error)
         .where(CameraRecord.snapshot_url.is_not(None), due)
-        .order_by(CameraRecord.snapshot_due_at, CameraRecord.id)
-        .limit(most)
+        .order_by(at, CameraRecord.id)
     )
-    return [(camera_id, url) for camera_id, url in rows if url is not None]
+    found = [
+        DueImage(camera_id=camera_id, url=str(url), answers=at is not None and error is None)
+        for camera_id, url, at, error in rows
+    ]
+    return sorted(found, key=lambda each: not each.answers)
+
+
+def with_credentials(session: Session) -> Sequence[CameraRecord]:
+    """Cameras that have credentials for their image."""
+    has = CameraRecord.snapshot_credentials.is_not(None)
+    return session.scalars(select(CameraRecord).where(has).order_by(CameraRecord.id)).all()
+
+
+def digest_urls(session: Session) -> Sequence[str]:
+    """Addresses of images at hosts that have asked for Digest."""
+    asked = CameraRecord.snapshot_url.is_not(None), CameraRecord.snapshot_digest
+    return [str(url) for url in session.scalars(select(CameraRecord.snapshot_url).where(*asked))]
 
 
 def lacking(session: Session, code: ServiceCode) -> set[str]:

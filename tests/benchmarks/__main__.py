@@ -31,6 +31,7 @@ BENCHMARKS: dict[str, tuple[str, ...]] = {
     "linking": (),
     "poison": (),
     "strangers": (),
+    "silent_cameras": (),
     "start": (),
     "idle": ("--cameras", "500", "--minutes", "1"),
     "fleet": (),

@@ -9,8 +9,9 @@ import contextlib
 import math
 import re
 import threading
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections import Counter
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 
 import anyio
@@ -20,13 +21,17 @@ from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.middleware.hosts import auth_on
-from service.errors import OverloadedError, TooLargeError
+from service.api.middleware.rate_limits import caller_key
+from service.errors import OverloadedError, TooLargeError, TooManyRequestsError
 from service.settings import Settings
 
 _COME_BACK_S = 2.0
 _OPERATION_AT_ONCE = 2
 _STRANGERS_AT_ONCE = 4
 _STRANGERS_MB = 1 / 64  # of a body: a token is some hundred bytes
+_IMAGES_AT_ONCE = 2  # one is decoded, one waits for its turn
+_AIMS_AT_ONCE = 8  # most of their time they wait for a camera
+_STREAMS_OF_A_CALLER = 4  # a caller opens at most one in so many of `max_streams`
 STREAM_POLLS = 2  # of all event streams together
 LOOKUPS = 4  # of who asks, before a request has its turn
 _THREADS_START_S = 30.0  # at the longest
@@ -79,6 +84,35 @@ class Lane:
             self._free.release()
 
 
+class Shares:
+    """Requests of one kind by caller or by camera, so that none of these takes all places."""
+
+    def __init__(self, name: str, most: int) -> None:
+        self._name = name
+        self._most = most
+        self._held: Counter[str] = Counter()
+
+    @contextmanager
+    def place(self, holder: str) -> Iterator[None]:
+        """Hold a place as long as the block lasts.
+
+        Raises:
+            TooManyRequestsError: the caller or camera holds its share already.
+        """
+        if self._held[holder] >= self._most:
+            raise TooManyRequestsError(
+                f"{self._name}: at most {self._most} at once for {holder:.80}",
+                retry_after_s=_COME_BACK_S,
+            )
+        self._held[holder] += 1
+        try:
+            yield
+        finally:
+            self._held[holder] -= 1
+            if not self._held[holder]:
+                del self._held[holder]
+
+
 class Lanes:
     """The lanes of an application."""
 
@@ -90,6 +124,8 @@ class Lanes:
         self._writes = lane("writes", settings.http_at_once, settings.http_waiting)
         self._operation = lane("operation", _OPERATION_AT_ONCE, settings.http_waiting)
         self._strangers = lane("logins", _STRANGERS_AT_ONCE, settings.http_waiting)
+        self._images = lane("images", _IMAGES_AT_ONCE, settings.http_waiting)
+        self._aims = lane("aims", _AIMS_AT_ONCE, settings.http_waiting)
         self._streams = lane("streams", settings.max_streams, 0)
 
     def of(self, scope: Scope, *, stranger: bool) -> Lane | None:
@@ -103,13 +139,18 @@ class Lanes:
             return self._strangers
         if path == "/events":
             return self._streams
+        # Both may take seconds: a camera that is asked for its image, or an image that is decoded.
+        if _AIM.fullmatch(path):
+            return self._aims
+        if scope["method"] == "PUT" and _IMAGE.fullmatch(path):
+            return self._images
         return self._reads if scope["method"] in ("GET", "HEAD") else self._writes
 
 
 def sessions_at_once(settings: Settings) -> int:
     """The most sessions that requests have at once: a request has one at a time."""
     in_lanes = 2 * settings.http_at_once + _OPERATION_AT_ONCE + _STRANGERS_AT_ONCE
-    return in_lanes + STREAM_POLLS + LOOKUPS
+    return in_lanes + _IMAGES_AT_ONCE + _AIMS_AT_ONCE + STREAM_POLLS + LOOKUPS
 
 
 async def start_threads(number: int) -> None:
@@ -129,6 +170,7 @@ async def start_threads(number: int) -> None:
 
 _MB = 1024 * 1024
 _TRACKS = re.compile(r"(/cameras/[^/]+/tracks|/ui/tracks)")
+_AIM = re.compile(r"/cameras/([^/]+)/aim")
 _IMAGE = re.compile(r"/cameras/[^/]+/(snapshot|aim|plan)")
 
 
@@ -143,6 +185,9 @@ class AdmissionMiddleware:
         self._app = app
         self._settings = settings
         self._lanes = Lanes(settings)
+        most = max(settings.max_streams // _STREAMS_OF_A_CALLER, 1)
+        self._streams = Shares("streams", most)
+        self._aims = Shares("aims", 1)
         self._auth = auth_on(settings)
         self._held = 0
 
@@ -192,8 +237,13 @@ class AdmissionMiddleware:
             self._held -= held
 
     async def _admit(self, lane: Lane | None, scope: Scope, receive: Receive, send: Send) -> None:
-        async with contextlib.nullcontext() if lane is None else lane.turn():
-            await self._app(scope, receive, send)
+        with contextlib.ExitStack() as share:
+            if scope["path"] == "/events":
+                share.enter_context(self._streams.place(caller_key(scope)))
+            elif aim := _AIM.fullmatch(scope["path"]):
+                share.enter_context(self._aims.place(f"camera {aim[1]}"))
+            async with contextlib.nullcontext() if lane is None else lane.turn():
+                await self._app(scope, receive, send)
 
     def _limit_mb(self, path: str) -> float:
         if _TRACKS.fullmatch(path):

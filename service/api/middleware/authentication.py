@@ -249,4 +249,4 @@ def _looks_for_page(request: Request) -> bool:
 def _to_login(request: Request) -> RedirectResponse:
     wanted = request.url.path + (f"?{request.url.query}" if request.url.query else "")
     where = "/ui/login" + ("" if wanted == "/" else f"?next={quote(wanted, safe='/')}")
-    return RedirectResponse(where, status_code=303, headers={"Cache-Control": "no-store"})
+    return RedirectResponse(where, status_code=303)

@@ -19,10 +19,13 @@ from service.api.middleware.instruments import Instruments
 from service.cameras.post_log import PostLog
 from service.cameras.tracks import Pictures, Quota, Watched
 from service.job_queue import JobQueue
+from service.notifications.host_backoff import HostBackoff
 from service.settings import Settings
 from service.store.access import set_actor
 from service.store.engines.sqlite import Turns
 from service.store.engines.store import Store
+
+_AIM_PAUSE_S = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +33,8 @@ class AppState:
     """State of one application from start to stop.
 
     Event streams follow the `feed`; large bodies are read in `large_bodies`' turns, still images in
-    `stills`', for each takes a process of its own.
+    `stills`', for each takes a process of its own. `image_hosts` are hosts of cameras that did not
+    answer an aim; its pause is short, because the person who aims may have just switched one on.
     """
 
     settings: Settings
@@ -44,6 +48,7 @@ class AppState:
     instruments: Instruments = field(default_factory=Instruments)
     large_bodies: Turns = field(default_factory=lambda: Turns("large bodies"))
     stills: Turns = field(default_factory=lambda: Turns("still images"))
+    image_hosts: HostBackoff = field(default_factory=lambda: HostBackoff(_AIM_PAUSE_S))
     stopping: threading.Event = field(default_factory=threading.Event)
 
 

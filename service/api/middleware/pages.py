@@ -25,11 +25,13 @@ HEADERS = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; object-src 'none'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
     "Referrer-Policy": "same-origin",
-    "Cache-Control": "no-store",
     "Vary": "Accept-Encoding, Accept-Language, Cookie",
 }
 
 
+# Of answers with an ETag that are asked for again and again: kept by the browser alone, and not
+# used without asking.
+REVALIDATED = {"Cache-Control": "private, no-cache"}
 # Of what has a version in its path.
 _FOR_EVER = {"Cache-Control": "public, max-age=31536000, immutable"}
 

@@ -33,6 +33,9 @@ FORESEEN = (
 # Nothing of ours shows in a page of another origin, and no browser guesses at a type: JSON with
 # text that a tracker made up is no page.
 _OF_ALL = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin"}
+# The default of every route: no browser and no proxy stores the answer.
+_NOT_STORED = "no-store"
+_HIDDEN = ("snapshot_credentials", "password", "token")  # fields that no answer repeats
 # What a person can do about what a program reads in the detail.
 _FOR_PEOPLE = {
     403: N_(
@@ -53,7 +56,8 @@ _BRIEF.maxstring = 80
 class ProblemMiddleware:
     """Answers what nobody foresaw, or what other middlewares raise, with a problem document.
 
-    It sees every answer, and says of each that a browser must not take it for anything else.
+    It sees every answer, and adds headers: no browser guesses its type, and none stores it unless
+    its route allows that.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -70,7 +74,11 @@ class ProblemMiddleware:
             nonlocal begun
             if message["type"] == "http.response.start":
                 begun = True
-                MutableHeaders(scope=message).update(_OF_ALL)
+                headers = MutableHeaders(scope=message)
+                headers.update(_OF_ALL)
+                # FastAPI's streams of events have "no-cache", which allows to store them.
+                if headers.get("cache-control", "no-cache") == "no-cache":
+                    headers["Cache-Control"] = _NOT_STORED
             await send(message)
 
         try:
@@ -149,12 +157,19 @@ def _malformed(error: RequestValidationError) -> ServiceError:
     errors = tuple(
         FieldError(
             pointer="".join(f"/{part}" for part in item["loc"] if part != "body")[:200],
-            reason=f"{item['msg']}, got {_BRIEF.repr(item.get('input')):.80}",
+            reason=item["msg"] + _got(item),
         )
         for item in error.errors()[:_MOST_ERRORS]
     )
     detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
     return _other(422, "malformed", detail, errors)
+
+
+def _got(item: dict[str, Any]) -> str:
+    """The value that was received, unless its field is secret."""
+    if any(part in _HIDDEN for part in item["loc"]):
+        return ""
+    return f", got {_BRIEF.repr(item.get('input')):.80}"
 
 
 def _other(

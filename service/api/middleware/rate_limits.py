@@ -61,14 +61,15 @@ class RateMiddleware:
             TooManyRequestsError: its caller asks too often, or its camera is told of too often.
         """
         if scope["type"] == "http" and scope["path"] not in _FREE:
-            self._callers.take(_caller(scope))
+            self._callers.take(caller_key(scope))
             camera = _CAMERA.fullmatch(scope["path"])
             if camera and scope["method"] == "POST":
                 self._cameras.take(camera[1])
         await self._app(scope, receive, send)
 
 
-def _caller(scope: Scope) -> str:
+def caller_key(scope: Scope) -> str:
+    """The name that limits count a caller by: its token, or its address without one."""
     state = scope.get("state", {})
     if state.get("token_id") is not None:
         return f"token {state['token_id']}"

@@ -47,6 +47,8 @@ async function ask() {
     }
   } catch (error) {
     if (!(error instanceof Refused)) throw error;
+    // Another page aims the same camera at this moment; the aim that is shown is a second old.
+    if (error.problem.code === "too_many_requests") return setTimeout(ask, EVERY_MS);
     root.dataset.state = "unknown";
     document.getElementById("aim-words").textContent = error.message;
     wait = PEOPLE_MS;

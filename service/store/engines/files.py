@@ -152,14 +152,16 @@ def drop_models(path: Path, model_ids: Sequence[str]) -> None:
         connection.executemany("DELETE FROM models WHERE id = ?", [(one,) for one in model_ids])
 
 
-def webhook_secrets(path: Path) -> list[tuple[str, str]]:
-    """The secrets of webhooks as they are stored, with the webhooks' ids."""
-    if "webhooks" not in tables(path):
+def sealed_secrets(path: Path) -> list[tuple[str, str]]:
+    """The purposes of all secrets, with the sealed secrets: as `keys` seals them."""
+    if not {"webhooks", "cameras"} <= tables(path):
         return []
     with connected(path) as connection:
         return connection.execute(
-            "SELECT id, secret FROM webhooks WHERE secret IS NOT NULL UNION ALL "
-            "SELECT id, old_secret FROM webhooks WHERE old_secret IS NOT NULL"
+            "SELECT 'webhook ' || id, secret FROM webhooks WHERE secret IS NOT NULL UNION ALL "
+            "SELECT 'webhook ' || id, old_secret FROM webhooks WHERE old_secret IS NOT NULL "
+            "UNION ALL SELECT 'camera ' || id, snapshot_credentials FROM cameras "
+            "WHERE snapshot_credentials IS NOT NULL"
         ).fetchall()
 
 

@@ -11,7 +11,7 @@ from service.app import create_app
 from service.formats import confined
 from service.formats.still import read_still
 from service.store import cameras
-from service.store.cameras import CameraRecord, SnapshotRecord
+from service.store.cameras import CameraRecord, DueImage, SnapshotRecord
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
@@ -158,7 +158,8 @@ def test_a_picture_of_the_future_gives_way_and_the_next_is_due(allowed, settings
         kept.taken_at, kept.stored_at = kept.taken_at + ahead, kept.stored_at + ahead
         camera = session.get(CameraRecord, "corner")
         camera.snapshot_url, camera.snapshot_due_at = "http://10.0.0.1/", now + every
-        assert cameras.snapshots_due(session, now, every, 9) == []
+        assert cameras.snapshots_due(session, now, every) == []
         camera.snapshot_due_at = now + ahead
-        assert cameras.snapshots_due(session, now, every, 9) == [("corner", "http://10.0.0.1/")]
+        (due,) = cameras.snapshots_due(session, now, every)
+        assert due == DueImage(camera_id="corner", url="http://10.0.0.1/", answers=True)
     assert allowed.put(URL, content=image(), headers=JPEG).status_code == 200

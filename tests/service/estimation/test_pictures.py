@@ -222,19 +222,20 @@ def test_an_older_picture_than_the_newest_is_refused(http):
 def test_a_camera_is_asked_for_its_picture_and_at_once_in_doubt(http, monkeypatch):
     seen = {"pose": PRIOR, "asked": 0}
 
-    def fetched(settings, url):
+    def fetched(*_):
         seen["asked"] += 1
         if seen["pose"] is None:
             raise FetchError("answered 500")
         return Fetched(content=picture(seen["pose"]), media_type="image/png")
 
-    monkeypatch.setattr(snapshots, "fetch", fetched)
+    monkeypatch.setattr(snapshots, "fetch_image", fetched)
+    fetching = snapshots.SnapshotRounds()
 
     def rounds(street):
         with street.context.store.read() as session:
-            due = cameras.snapshots_due(session, datetime.now(UTC), timedelta(hours=1), 9)
-        for camera_id, url in due:
-            snapshots.fetch_snapshot(street.context, camera_id, url)
+            due = cameras.snapshots_due(session, datetime.now(UTC), timedelta(hours=1))
+        for each in due:
+            fetching.fetch(street.context, each.camera_id)
         return len(due)
 
     street = known_street(http, http.settings, 60)
@@ -294,7 +295,7 @@ def test_who_stands_on_the_ladder_is_told_where_to_turn_it(http, monkeypatch):
     address = {"snapshot_url": "http://camera.example/now.jpg"}
     http.patch("/cameras/corner", json=address, headers={"If-Match": "*"}).raise_for_status()
     asked = Fetched(content=picture(TURNED), media_type="image/png")
-    monkeypatch.setattr(aim_route, "fetch", lambda *_: asked)
+    monkeypatch.setattr(aim_route, "fetch_image", lambda *_: asked)
     assert http.post("/cameras/corner/aim").json()["up_deg"] == pytest.approx(3.0, abs=0.1)
 
 
