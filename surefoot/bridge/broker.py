@@ -100,6 +100,11 @@ class Broker:
         )
         self._client.loop_start()
 
+    @property
+    def connected(self) -> bool:
+        """True while messages come."""
+        return self._connected
+
     def say(self, topic: str, payload: str) -> None:
         """Publish a retained message if it is news; an empty one takes the topic away."""
         with self._lock:
@@ -157,4 +162,8 @@ class Broker:
         self._note_connection(False)
 
     def _on_message(self, _: Client, __: Any, message: MQTTMessage) -> None:
-        self.inbox.add(message.topic, bytes(message.payload), message.mid, message.qos)
+        try:
+            topic = message.topic
+        except UnicodeDecodeError:  # not every broker checks; an error would end paho's thread
+            topic = repr(bytes(message._topic))
+        self.inbox.add(topic, bytes(message.payload), message.mid, message.qos)
