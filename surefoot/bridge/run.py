@@ -66,7 +66,9 @@ class Bridge:
         )
 
         def report() -> dict[str, Any]:
-            return tally.report() | {
+            found = tally.report()
+            found["counts"]["messages_dropped"] = broker.inbox.dropped
+            return found | {
                 "connected": broker.connected,
                 "waiting": self.spool.waiting,
                 "spools_moved_aside": self.spool.moved_aside,
@@ -91,9 +93,9 @@ class Bridge:
 
         works: dict[str, Callable[[Service], None]] = {
             "inward": lambda _: inward.carry(stopping),
-            "posting": lambda service: Posting(spool=self.spool, service=service, door=door, tally=tally).run(
-                stopping
-            ),
+            "posting": lambda service: Posting(
+                spool=self.spool, service=service, door=door, tally=tally
+            ).run(stopping),
             "states": lambda service: outward.tell(service, stopping),
             "events": lambda service: outward.listen(service, stopping),
             "heartbeat": lambda service: heartbeat.run(service, stopping),
