@@ -17,6 +17,7 @@ from surefoot.bridge.values import (
     MessageError,
     SkippedRow,
     WholeTrack,
+    box_of,
     each_row,
     listed,
     moment,
@@ -50,9 +51,9 @@ def read_message(message: bytes, cameras: Mapping[int, str]) -> list[_Found]:
     if "frame" in found:
         return _beta_frame(table(found["frame"], "frame"), cameras.get(_FIRST))
     if "detections" in found or "track_events" in found:
-        return _frame(found, _camera(found, cameras))
+        return _frame(found, _camera(found, cameras, "axis.scene.frame_v1"))
     if "path" in found:
-        return _track(found, "path", _camera(found, cameras))
+        return _track(found, "path", _camera(found, cameras, "axis.scene.object_track_v1"))
     if "observations" in found:
         return _track(found, "observations", cameras.get(_FIRST))
     needed = "`detections`, `frame`, `path` or `observations` is needed"
@@ -60,8 +61,8 @@ def read_message(message: bytes, cameras: Mapping[int, str]) -> list[_Found]:
     raise MessageError("malformed", f"Axis scene metadata: {needed}, got the fields {got:.120}")
 
 
-def _camera(found: dict[str, Any], cameras: Mapping[int, str]) -> str | None:
-    return cameras.get(int(number(found.get("channel_id"), "channel_id")))
+def _camera(found: dict[str, Any], cameras: Mapping[int, str], topic: str) -> str | None:
+    return cameras.get(int(number(found.get("channel_id"), f"channel_id of {topic}")))
 
 
 def _frame(frame: dict[str, Any], camera: str | None) -> list[_Found]:
@@ -165,5 +166,4 @@ def _likeliest(classes: Any) -> str | None:
 
 def _box(value: Any, where: str) -> Box:
     edges = table(value, where)
-    left, top, right, bottom = (number(edges.get(name), f"{where}/{name}") for name in _EDGES)
-    return left, top, right, bottom
+    return box_of([number(edges.get(name), f"{where}/{name}") for name in _EDGES], where)

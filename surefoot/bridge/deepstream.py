@@ -7,6 +7,7 @@ from surefoot.bridge.values import (
     Detection,
     MessageError,
     SkippedRow,
+    box_of,
     each_row,
     moment,
     number,
@@ -58,9 +59,9 @@ def read_message(
             raise MessageError("malformed", f"{where}: {needed}, got {row!r:.80}")
         if cells[0] in _UNTRACKED:
             return None
-        left, top, right, bottom = (number(cell, where) for cell in cells[1:5])
+        box = box_of([number(cell, where) for cell in cells[1:5]], where)
         track_id, label = text(cells[0], where), text(cells[5], where)
-        return Detection(camera, time_s, track_id, label, (left, top, right, bottom), size)
+        return Detection(camera, time_s, track_id, label, box, size)
 
     return list(each_row(found.get("objects"), "objects", detection))
 
@@ -71,13 +72,14 @@ def _object(found: dict[str, Any], camera: str, size: _Size) -> Detection | None
     if track_id in _UNTRACKED:
         return None
     edges = table(seen.get("bbox"), "object/bbox")
-    left, top, right, bottom = (number(edges.get(name), f"object/bbox/{name}") for name in _EDGES)
+    places = [number(edges.get(name), f"object/bbox/{name}") for name in _EDGES]
+    box = box_of(places, "object/bbox")
     # The class is the name of the field that holds its attributes, `"person": {"age": ...}`;
     # DeepStream writes it before all other objects.
     kinds = [name for name, value in seen.items() if _is_class(name, value)]
     label = text(kinds[0], "object") if kinds else None
     time_s = moment(found.get("@timestamp"), "@timestamp")
-    return Detection(camera, time_s, track_id, label, (left, top, right, bottom), size)
+    return Detection(camera, time_s, track_id, label, box, size)
 
 
 def _is_class(name: str, value: Any) -> bool:

@@ -12,7 +12,9 @@ from surefoot.bridge.values import Found, MessageError, check_size
 
 _CAMERA = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
 _SIZE = re.compile(r"([1-9][0-9]{0,5})x([1-9][0-9]{0,5})")
-_FORMATS = "axis, onvif-normalised, onvif-transformed, onvif-grid, deepstream-1920x1080"
+_FORMATS = ", ".join(
+    ["axis", *(f"onvif-{profile}" for profile in onvif.Profile), "deepstream-1920x1080"]
+)
 _CHANNELS = range(2, 9)  # of a device with several sensors
 _MOST_KNOWN = 10_000  # topics whose feed is remembered
 

@@ -8,6 +8,7 @@ from surefoot.bridge.values import (
     Ended,
     MessageError,
     SkippedRow,
+    box_of,
     each_row,
     number,
     parsed_json,
@@ -38,8 +39,8 @@ def read_frame(message: bytes, camera: str) -> list[Detection | Ended | SkippedR
         seen = table(row, where)
         track_id = text(seen.get("id"), f"{where}/id")
         label = None if seen.get("class") is None else text(seen["class"], f"{where}/class")
-        x1, y1, x2, y2 = _numbers(seen.get("box"), 4, f"{where}/box")
-        return Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size)
+        box = box_of(_numbers(seen.get("box"), 4, f"{where}/box"), f"{where}/box")
+        return Detection(camera, time_s, track_id, label, box, size)
 
     def ended(row: Any, where: str) -> Ended:
         return Ended(camera, text(row, where))

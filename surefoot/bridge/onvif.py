@@ -21,6 +21,7 @@ from surefoot.bridge.values import (
     Ended,
     MessageError,
     SkippedRow,
+    box_of,
     check_size,
     each_row,
     moment,
@@ -46,6 +47,8 @@ class Profile(StrEnum):
 
     NORMALISED = "normalised"  # -1 to 1, y up, whatever Transformation stands beside them
     TRANSFORMED = "transformed"  # the frame's Transformation makes them so, as the standard says
+    NORMALISED_DOWN = "normalised-down"  # -1 to 1, y down
+    SHARES = "shares"  # 0 to 1, y down
     GRID = "grid"  # 0 to 8192, y down, without a Transformation: Dahua
 
 
@@ -87,7 +90,7 @@ def read_json(message: bytes, camera: str, profile: Profile) -> list[_Found]:
 def _read(root: _Node, camera: str, profile: Profile) -> list[_Found]:
     found: list[_Found] = []
     for frame in _frames_in(root):
-        time_s = moment(frame.get("@UtcTime"), "Frame/@UtcTime")
+        time_s = moment(_attribute(frame, "UtcTime"), "Frame/@UtcTime")
         place = _place_of(frame, profile)
         person = partial(_detection, camera=camera, time_s=time_s, place=place, profile=profile)
         found += each_row(_all(frame, "Object"), "Object", person)
@@ -124,7 +127,7 @@ def _detection(
     each: _Node, where: str, *, camera: str, time_s: float, place: _Place, profile: Profile
 ) -> Detection | None:
     # A head or a face of a person that is in the frame itself.
-    if "@Parent" in each:
+    if _attribute(each, "Parent") is not None:
         return None
     look = _first(each, "Appearance")
     edges = _first(_first(look, "Shape"), "BoundingBox")
@@ -133,18 +136,22 @@ def _detection(
     if profile is Profile.TRANSFORMED and _first(look, "Transformation"):
         words = "Appearance/Transformation: only the frame's own is supported"
         raise MessageError("unsupported", f"{where}/{words}")
-    track_id = text(each.get("@ObjectId"), f"{where}/@ObjectId")
-    return Detection(camera, time_s, track_id, _label(look), _box(edges, place), NORMALISED)
+    track_id = text(_attribute(each, "ObjectId"), f"{where}/@ObjectId")
+    return Detection(camera, time_s, track_id, _label(look), _box(edges, place, where), NORMALISED)
 
 
 def _ended(each: _Node, where: str, *, camera: str) -> Ended:
-    return Ended(camera, text(each.get("@ObjectId"), f"{where}/@ObjectId"))
+    return Ended(camera, text(_attribute(each, "ObjectId"), f"{where}/@ObjectId"))
 
 
 def _place_of(frame: _Node, profile: Profile) -> _Place:
     """How a point of a frame's boxes becomes shares of the picture, y down."""
     if profile is Profile.GRID:
         return lambda x, y: (x / _GRID, y / _GRID)
+    if profile is Profile.SHARES:
+        return lambda x, y: (x, y)
+    if profile is Profile.NORMALISED_DOWN:
+        return lambda x, y: ((x + 1) / 2, (y + 1) / 2)
     scale_x = scale_y = 1.0
     shift_x = shift_y = 0.0
     if profile is Profile.TRANSFORMED:
@@ -164,23 +171,28 @@ def _place_of(frame: _Node, profile: Profile) -> _Place:
     )
 
 
-def _box(edges: _Node, place: _Place) -> Box:
+def _box(edges: _Node, place: _Place, where: str) -> Box:
     left, top, right, bottom = (
-        number(edges.get(f"@{name}"), f"BoundingBox/@{name}")
+        number(_attribute(edges, name), f"{where}/BoundingBox/@{name}")
         for name in ("left", "top", "right", "bottom")
     )
-    (x1, y1), (x2, y2) = place(left, top), place(right, bottom)
-    return min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
+    # As it is placed, the top lies above the bottom: otherwise this is another profile's box, whose
+    # feet would be taken for a head.
+    return box_of((*place(left, top), *place(right, bottom)), f"{where}/BoundingBox")
 
 
 def _pair(node: _Node, what: str) -> tuple[float, float]:
-    return number(node.get("@x"), f"{what}/@x"), number(node.get("@y"), f"{what}/@y")
+    x, y = _attribute(node, "x"), _attribute(node, "y")
+    return number(x, f"{what}/@x"), number(y, f"{what}/@y")
 
 
 def _label(look: _Node) -> str | None:
     """The likeliest class: `Class/Type` with its likelihood, `Class/ClassCandidate` before 2.4."""
     kinds = _first(look, "Class")
-    named = [(each.get("@Likelihood", 0), each.get(_TEXT)) for each in _all(kinds, "Type")]
+    named = [
+        (_attribute(each, "Likelihood", 0), each.get(_TEXT, each.get("$")))
+        for each in _all(kinds, "Type")
+    ]
     for each in _all(kinds, "ClassCandidate"):
         likelihood = _first(each, "Likelihood").get(_TEXT, 0)
         named.append((likelihood, _first(each, "Type").get(_TEXT)))
@@ -195,6 +207,11 @@ def _all(node: _Node, name: str) -> list[_Node]:
     found = node.get(name)
     several = found if isinstance(found, list) else [] if found is None else [found]
     return [each if isinstance(each, dict) else {_TEXT: each} for each in several]
+
+
+def _attribute(node: _Node, name: str, default: Any = None) -> Any:
+    """An attribute of an element; some converters to JSON leave out its @."""
+    return node.get(f"@{name}", node.get(name, default))
 
 
 def _first(node: _Node, name: str) -> _Node:

@@ -182,6 +182,20 @@ def listed(value: Any, what: str) -> list[Any]:
     return value
 
 
+def box_of(edges: Sequence[float], what: str) -> Box:
+    """The box with these edges (x1, y1, x2, y2), y down.
+
+    Raises:
+        MessageError: it has no area, or its sides are swapped: a source that counts upwards, or
+            that names width and height.
+    """
+    x1, y1, x2, y2 = edges
+    if not (x1 < x2 and y1 < y2):
+        needed = "left < right and top above bottom are needed"
+        raise MessageError("malformed", f"{what}: {needed}, got {x1:g}, {y1:g}, {x2:g}, {y2:g}")
+    return x1, y1, x2, y2
+
+
 def each_row(
     rows: Any, what: str, read: Callable[[Any, str], _Row | None]
 ) -> Iterator[_Row | SkippedRow]:

@@ -79,7 +79,10 @@ def test_read_deepstream_full_schema_takes_the_class_from_its_field(kind):
     ("message", "needed"),
     [
         (b'{"objects": [], "time": 1}', "`frame`, `path` or `observations` is needed, got the fi"),
-        (b'{"detections": [], "timestamp": "2026-11-20T08:00:00Z"}', "^channel_id: a number"),
+        (
+            b'{"detections": [], "timestamp": "2026-11-20T08:00:00Z"}',
+            "^channel_id of axis.scene.frame_v1: a",
+        ),
     ],
 )
 def test_read_axis_rejects_unknown_message_with_its_fields(message, needed):
