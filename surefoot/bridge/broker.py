@@ -43,6 +43,14 @@ class Address:
         """True for `mqtts`."""
         return urlsplit(self.url).scheme == "mqtts"
 
+    def tls_context(self) -> ssl.SSLContext:
+        """The certificates that the broker's is checked by.
+
+        Raises:
+            OSError: `ca_file` cannot be read, or has no certificate.
+        """
+        return ssl.create_default_context(cafile=self.ca_file)
+
     @property
     def host_and_port(self) -> tuple[str, int]:
         """Where it listens."""
@@ -84,8 +92,7 @@ class Broker:
         if address.user is not None:
             client.username_pw_set(address.user, address.password)
         if address.uses_tls:
-            context = ssl.create_default_context(cafile=address.ca_file)
-            client.tls_set_context(context)
+            client.tls_set_context(address.tls_context())
         self._address = address
 
     def start(self) -> None:

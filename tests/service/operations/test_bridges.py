@@ -9,6 +9,7 @@ from service.access.tokens import TokenSpec, make_token
 from service.alerts import bridges as watching
 from service.alerts.staleness import StaleWatch
 from service.app import create_app
+from service.commands.local_bridge import LocalBridge
 from service.operations.bridges import note_trouble
 from service.store import bridges
 from service.store.bridges import BridgeRecord
@@ -145,6 +146,18 @@ def test_bridge_that_serve_cannot_keep_running_is_named(corner, store):
     with store.write() as session:
         note_trouble(session, "nvr-east", None)
     assert words[1:] not in corner.get("/ui/health/banner").text
+
+
+def test_serve_names_its_bridge_from_the_third_end_on(corner, settings):
+    bridge = LocalBridge(settings, "127.0.0.1", 1, None)
+    words = "the MQTT bridge surefoot-bridge does not keep running: it ended 3 times in a row, the"
+    for deaths in (1, 2, 3):
+        assert not any(words in each for each in corner.get("/readyz").json()["problems"])
+        bridge._tell(-11, deaths, 1.0)
+    (problem,) = (each for each in corner.get("/readyz").json()["problems"] if words in each)
+    assert problem.endswith("the last time: ended by signal 11")
+    with bridge:  # no broker is configured any more
+        assert not any(words in each for each in corner.get("/readyz").json()["problems"])
 
 
 def test_bridge_without_its_broker_is_named_on_pages(corner, store):
