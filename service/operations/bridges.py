@@ -16,6 +16,7 @@ from service.store.engines.dialects import now_in
 ABOUT = "bridges/"  # what is written about
 MOST_BRIDGES = 100
 _KEPT_STARTS = 10
+_FED_S, _MOST_FED = 86_400.0, 1_000
 _KEEP_STOPPED = timedelta(days=7)
 # Counts of a report, as `/metrics` and the health page have them.
 COUNTS = (
@@ -63,7 +64,8 @@ def note_heartbeat(session: Session, name: str, beat: Beat, caller: Caller | Non
         record.started_at = beat.started_at
         record.recent_starts = [*record.recent_starts, now.timestamp()][-_KEPT_STARTS:]
     record.token_id, record.heartbeat_at = token_id, now
-    record.stopped, record.report = beat.stopped, beat.report
+    record.stopped = beat.stopped
+    record.report = beat.report | {"cameras": _fed(record.report, beat.report, now)}
     bridges.forget(session, now - _KEEP_STOPPED)
 
 
@@ -81,6 +83,19 @@ def note_stopped(session: Session, name: str) -> None:
     record = session.get(BridgeRecord, name)
     if record is not None:
         record.stopped, record.trouble = True, None
+
+
+def _fed(before: dict[str, Any], report: dict[str, Any], now: datetime) -> dict[str, float]:
+    """The cameras that a bridge feeds, with the times of their reports.
+
+    A new process has posted for none yet, and feeds those of the last one.
+    """
+    at_s = now.timestamp()
+    known = {name: s for name, s in before.get("cameras", {}).items() if at_s - s < _FED_S}
+    for name in report["cameras"]:
+        known.pop(name, None)
+        known[name] = at_s
+    return dict(list(known.items())[-_MOST_FED:])
 
 
 def _added(session: Session, name: str, now: datetime) -> BridgeRecord:

@@ -17,6 +17,7 @@ _LOG_S = 60.0
 _MOST_KEYS = 10_000  # of the log's memory: wildcards match whatever others publish
 _MOST_UNKNOWN = 50  # names of unknown cameras that are counted by name
 _MOST_CAMERAS = 1_000
+_FED_S = 86_400.0  # a camera that gets no tracks for longer is not fed by this bridge
 _NEWEST = 10  # rejections that are kept whole
 OTHERS = "others"
 
@@ -33,7 +34,7 @@ class Tally:
         self._started_at = datetime.now(UTC)
         self._counts: Counter[str] = Counter()
         self._unknown: Counter[str] = Counter()
-        self._cameras: dict[str, None] = {}  # posted to, the newest last
+        self._cameras: dict[str, float] = {}  # when they were posted to last, the newest last
         self._newest: deque[dict[str, Any]] = deque(maxlen=_NEWEST)
         self._logged_s: dict[tuple[str, ...], float] = {}
 
@@ -47,7 +48,7 @@ class Tally:
         with self._lock:
             self._counts["tracks_posted"] += accepted
             self._cameras.pop(camera, None)
-            self._cameras[camera] = None
+            self._cameras[camera] = self._clock()
             if len(self._cameras) > _MOST_CAMERAS:
                 del self._cameras[next(iter(self._cameras))]
 
@@ -75,12 +76,13 @@ class Tally:
 
     def report(self) -> dict[str, Any]:
         """The counts as the heartbeat sends them."""
+        since_s = self._clock() - _FED_S
         with self._lock:
             return {
                 "started_at": self._started_at.isoformat(),
                 "counts": dict(self._counts),
                 "unknown_cameras": dict(self._unknown),
-                "cameras": list(self._cameras),
+                "cameras": [name for name, at_s in self._cameras.items() if at_s > since_s],
                 "newest_rejections": list(self._newest),
             }
 
