@@ -21,6 +21,7 @@ BRIDGE = "bridge.sqlite"  # what the bridge has not posted yet
 COMPILED = "compiled"  # in the image: machine code of models/, where no other place can be written
 _OURS = (
     *(name + end for name in (DATABASE, BRIDGE) for end in ("", "-wal", "-shm", "-journal")),
+    BRIDGE + ".damaged-*",
     *(WEIGHTS, COPIES, COMPILED, SERVE_LOCK, MIGRATE_LOCK, ROUNDS_LOCK, "worker-*.lock"),
     *(KEY_FILE, KEY_FILE + ".*", "restored", "restoring-*", "replaced-*"),
 )

@@ -22,6 +22,7 @@ import logging
 import math
 import os
 import random
+import re
 import tempfile
 import threading
 import time
@@ -43,6 +44,7 @@ _TICK_S = 0.5
 _SHORTEST_WAIT_S, _LONGEST_WAIT_S = 1.0, 60.0
 _CLOCK_S = 5.0  # that clocks may differ by without a word; a second of it is the header's own
 # Nothing is wrong with the tracks: they are posted again, once somebody has mended it.
+_NAME = re.compile(r"[0-9]{1,18}-[0-9]{1,9}\.json")  # number and tracks of a file
 _MAY_BE_MENDED = frozenset((401, 403, 404, 408, 409, 421, 425, 429))
 
 
@@ -121,6 +123,7 @@ class Client:
         self._spool = Path(spool or tempfile.mkdtemp(prefix="surefoot-"))
         self._spool.mkdir(parents=True, exist_ok=True)
         self._spool_bytes = int(spool_mb * 1e6)
+        self._unreadable: set[Path] = set()
         self._number = max((_number_of(path) for path in self._files()), default=0)
         self._open: dict[str, list[list[float]]] = {}  # rows of time and box
         self._heard_s: dict[str, float] = {}
@@ -205,15 +208,19 @@ class Client:
         again_s, wait_s = 0.0, _SHORTEST_WAIT_S
         while True:
             stopping = self._stop.wait(_TICK_S)
-            self._keep_finished()
-            while time.monotonic() >= again_s and (files := self._files()):
-                asked_s = self._post(files[0])
-                if asked_s is None:
-                    wait_s = _SHORTEST_WAIT_S
-                    continue
-                # Many that were held up do not come back at once.
-                again_s = time.monotonic() + max(asked_s, wait_s * random.uniform(0.5, 1.0))
-                wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
+            try:
+                self._keep_finished()
+                while time.monotonic() >= again_s and (files := self._files()):
+                    asked_s = self._post(files[0])
+                    if asked_s is None:
+                        wait_s = _SHORTEST_WAIT_S
+                        continue
+                    # Many that were held up do not come back at once.
+                    again_s = time.monotonic() + max(asked_s, wait_s * random.uniform(0.5, 1.0))
+                    wait_s = min(2 * wait_s, _LONGEST_WAIT_S)
+            except Exception:  # without this thread, tracks would be taken and never posted
+                log.exception("the spool %s cannot be worked on; it is tried again", self._spool)
+                again_s = time.monotonic() + _LONGEST_WAIT_S
             if stopping:
                 return
 
@@ -237,6 +244,7 @@ class Client:
         self._number += 1
         path = self._spool / f"{self._number:012}-{len(tracks)}.json"
         try:
+            self._spool.mkdir(parents=True, exist_ok=True)  # it may have been cleaned away
             with open(path.with_suffix(".part"), "wb") as file:
                 file.write(content)
                 file.flush()
@@ -254,7 +262,10 @@ class Client:
             log.error("%d tracks are lost: %s", len(tracks), error)
 
     def _files(self) -> list[Path]:
-        return sorted(self._spool.glob("[0-9]*-[0-9]*.json"))
+        with contextlib.suppress(OSError):
+            found = [path for path in self._spool.iterdir() if _NAME.fullmatch(path.name)]
+            return sorted(path for path in found if path not in self._unreadable)
+        return []
 
     def _lose(self, path: Path, why: str) -> None:
         tracks = _tracks_of(path)
@@ -265,7 +276,16 @@ class Client:
     def _post(self, path: Path) -> float | None:
         """Post a file; None where it is done with, else how long at least to wait, in seconds."""
         try:
-            status, headers, body = self._ask(path.read_bytes())
+            content = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:  # the others do not wait for it
+            self._unreadable.add(path)
+            self.posted["lost"] += _tracks_of(path)
+            log.error("%d tracks are lost: %s", _tracks_of(path), error)
+            return None
+        try:
+            status, headers, body = self._ask(content)
             self._see_clock(headers.get("Date"))
             if status == 202:
                 self._count(json.loads(body))

@@ -55,6 +55,7 @@ CALLED = {
                                     "heading_rad": 0.0, "height_m": 0.1})},
     "events": {"id": 1, "type": "alert", "payload": "{}"},
     "workers": {"name": "local-0"},
+    "bridges": {"name": "surefoot-bridge", "recent_starts": "[]", "report": "{}"},
     "webhooks": {"id": "w" * 32, "name": "duty", "url": "https://example.org/h", "kinds": None,
                  "format": "webhook", "enabled": 0, "disabled_reasons": TURNED, "secret": None},
     "deliveries": {"number": 1, "id": "d" * 32, "webhook_id": "w" * 32, "alert_id": "a" * 32,

@@ -499,6 +499,17 @@ table(
     *optional(DateTime, "mailed_at"),
     *optional(String, "error"),
 )
+table(
+    "bridges",
+    key("name", String(63)),
+    *optional(String(16), "token_id"),
+    *needed(DateTime, "started_at", "heartbeat_at"),
+    *needed(NUMBER, "starts"),
+    *needed(JSON, "recent_starts"),
+    *needed(Boolean, "stopped"),
+    *needed(JSON, "report"),
+    *optional(String, "trouble"),
+)
 table("store_probes", key("id", NUMBER), *needed(DateTime, "written_at"))
 
 # Entries of the log are never changed, and for 30 days not deleted.

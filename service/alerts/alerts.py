@@ -110,6 +110,39 @@ def open_alert(
     return record
 
 
+def open_group_alert(
+    session: Session,
+    kind: AlertKind,
+    severity: Severity,
+    *,
+    track_source: str,
+    camera_ids: list[str],
+    reasons: Reasons,
+    source: AlertSource,
+) -> AlertRecord:
+    """Open an alert about several cameras that one source feeds; it has no alerts as members."""
+    now = datetime.now(UTC)
+    record = AlertRecord(
+        id=secrets.token_hex(16),
+        camera_ids=camera_ids,
+        track_source=track_source,
+        kind=kind,
+        state=AlertState.FIRING,
+        source=source,
+        severity=severity,
+        reasons=reasons,
+        drift={},
+        notified=False,
+        opened_at=now,
+        updated_at=now,
+    )
+    session.add(record)
+    session.flush()
+    _keep_activity(session, record, AlertActivity.OPENED, None)
+    _tell(session, record, MessageType.ALERT_OPENED)
+    return record
+
+
 def end_alert(
     session: Session, camera_id: str, kind: AlertKind, outcome: Outcome, note: str | None = None
 ) -> None:

@@ -7,6 +7,7 @@ from sqlalchemy.orm import Session
 
 from models.reasons import Reason, Value
 from service.alerts.alerts import end_alert, open_alert
+from service.alerts.bridges import BridgeWatch
 from service.enums import AlertActivity, AlertKind, AlertSource, Outcome, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
@@ -28,9 +29,10 @@ class StaleWatch:
     def __init__(self) -> None:
         # The oldest track of a camera that nothing has looked at, and since when it is watched.
         self._waiting: dict[str, tuple[int, float]] | None = None
+        self._bridges = BridgeWatch()
 
     def watch(self, session: Session, settings: Settings) -> dict[str, str]:
-        """Bring all alerts `stale` up to date; says of whom it opened or ended one."""
+        """Bring all alerts `stale` up to date; return the cameras whose alert opened or ended."""
         now_s = time.monotonic()
         firing = alerts.firing_codes(session, AlertKind.STALE)
         unseen = tracks.unseen_since(session)
@@ -61,6 +63,7 @@ class StaleWatch:
             elif not _answered(session, camera):
                 _open(session, settings, camera, reason, waits_s)
                 found[camera.id] = AlertActivity.OPENED
+        self._bridges.watch(session, settings)
         return found
 
 

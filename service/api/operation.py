@@ -23,6 +23,7 @@ from service.api.middleware.hosts import auth_on
 from service.api.schemas import Out
 from service.enums import AlertKind, Health, PoseState, Readiness, Severity, TrainingState
 from service.operations import health as checks
+from service.operations.bridges import COUNTS
 from service.operations.health import Metrics, load_metrics
 
 
@@ -41,6 +42,7 @@ class ReadyOut(Out):
     worker_silent_s: float | None
     queue_lag_s: float
     failing_cameras: int
+    bridge_silent_s: float | None
     problems: list[str]
 
 
@@ -59,6 +61,7 @@ class MetricsCollector(Collector):
         yield from _of_alerts(self._metrics)
         yield from _of_webhooks(self._metrics)
         yield from _of_service(self._metrics)
+        yield from _of_bridges(self._metrics)
         for other in self._others:
             yield from other.collect()
 
@@ -175,6 +178,43 @@ def _of_service(metrics: Metrics) -> Iterator[Metric]:
     lag = "Age of the oldest track that nothing has looked at, of all cameras."
     yield GaugeMetricFamily("surefoot_queue_lag_seconds", lag, value=metrics.queue_lag_s)
     yield CounterMetricFamily("surefoot_events", "Events ever written.", value=metrics.events)
+
+
+def _of_bridges(metrics: Metrics) -> Iterator[Metric]:
+    known = metrics.bridges
+    for name, text, values in (
+        (
+            "surefoot_bridge_last_heartbeat_timestamp_seconds",
+            "When a bridge last reported.",
+            {(b.name,): b.heartbeat_at.timestamp() for b in known},
+        ),
+        (
+            "surefoot_bridge_connected",
+            "1 while a bridge is connected to its broker.",
+            {(b.name,): bool(b.report.get("connected")) and not b.stopped for b in known},
+        ),
+        (
+            "surefoot_bridge_tracks_waiting",
+            "Tracks that a bridge has not posted yet.",
+            {(b.name,): b.report.get("waiting", 0) for b in known},
+        ),
+    ):
+        yield _gauge(name, text, ["bridge"], values)
+    restarts = CounterMetricFamily(
+        "surefoot_bridge_restarts", "How often a bridge was started again.", labels=["bridge"]
+    )
+    counts = CounterMetricFamily(
+        "surefoot_bridge_items",
+        "Messages, rows and tracks that a bridge has handled since it started, by outcome.",
+        labels=["bridge", "outcome"],
+    )
+    for bridge in known:
+        restarts.add_metric([bridge.name], max(bridge.starts - 1, 0))
+        for outcome in COUNTS:
+            found = bridge.report.get("counts", {}).get(outcome, 0)
+            counts.add_metric([bridge.name, outcome], found)
+    yield restarts
+    yield counts
 
 
 def _gauge(

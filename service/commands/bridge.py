@@ -25,17 +25,10 @@ def run_bridge(
     """
     if settings.mqtt_url is None:
         raise StartError("SUREFOOT_MQTT_URL: mqtt://host:port of a broker is needed, got none")
-    if settings.mqtt_ca_file is not None and not settings.mqtt_ca_file.is_file():
-        raise StartError(f"SUREFOOT_MQTT_CA_FILE: a file is needed, got {settings.mqtt_ca_file}")
     try:
         feeds = read_feeds(settings.mqtt_feeds)
     except ValueError as error:
         raise StartError(f"SUREFOOT_MQTT_FEEDS: {error}") from error
-    stopping = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stopping.set())
-    if follow_stdin:
-        at_end_of_stdin(stopping.set)
     address = Address(
         url=settings.mqtt_url,
         client_id=settings.mqtt_client_id,
@@ -43,6 +36,19 @@ def run_bridge(
         password=settings.mqtt_password,
         ca_file=settings.mqtt_ca_file,
     )
+    if settings.mqtt_ca_file is not None:
+        try:
+            address.tls_context()
+        except OSError as error:  # ssl.SSLError, too
+            needed = "a file with PEM certificates is needed"
+            raise StartError(
+                f"SUREFOOT_MQTT_CA_FILE: {needed}, got {settings.mqtt_ca_file} ({error})"
+            ) from error
+    stopping = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stopping.set())
+    if follow_stdin:
+        at_end_of_stdin(stopping.set)
     topics = Topics(
         prefix=settings.mqtt_prefix,
         frigate=settings.mqtt_frigate or None,

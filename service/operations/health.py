@@ -8,16 +8,28 @@ from datetime import UTC, datetime
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
+from service.alerts.bridges import problem_of
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import TrainingState
 from service.errors import OverloadedError
 from service.settings import Settings
-from service.store import cameras, fleet, journal, tracks, trainings, webhooks, workers
+from service.store import (
+    bridges,
+    cameras,
+    fleet,
+    journal,
+    tracks,
+    trainings,
+    webhooks,
+    workers,
+)
 from service.store.alerts import AlertRecord
+from service.store.bridges import BridgeRecord
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import now_in
 from service.store.engines.failures import failure_of
 from service.store.engines.store import Store
+from service.wording.reasons import in_words
 
 _LONGEST_LAG_S = 60.0
 _FULL_MB = 1.0  # a small write, as ours is, may still find room in the file that is there
@@ -30,8 +42,9 @@ class Readiness:
 
     A camera whose looks fail is a problem that is named, but does not make the service unready:
     restarting it, or sending posts elsewhere, would harm all the others. Where most of them fail,
-    it is not a camera's fault. `queue_lag_s` is the age of the oldest track that nothing has
-    looked at.
+    it is not a camera's fault. A failing bridge is named likewise; `bridge_silent_s` is the longest
+    silence of a bridge, None if none runs. `queue_lag_s` is the age of the oldest track that
+    nothing has looked at.
     """
 
     problems: tuple[str, ...]
@@ -40,6 +53,7 @@ class Readiness:
     worker_silent_s: float | None = None
     queue_lag_s: float = 0.0
     failing_cameras: int = 0
+    bridge_silent_s: float | None = None
     ready: bool = False
 
 
@@ -51,6 +65,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
             workers.write_probe(session, now)
         with store.read() as session:
             known, asked = workers.every(session), now_in(session)
+            carrying = bridges.every(session)
             failing = {camera.id: camera for camera in cameras.failing(session)}
             count = cameras.count(session)
             came = {camera_id: at for camera_id, (_, at) in tracks.unseen_since(session).items()}
@@ -77,8 +92,15 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
         worker_silent_s=silent_s,
         queue_lag_s=_oldest_s(list(came.values()), now),
         failing_cameras=len(failing),
+        # The API works without a bridge, and restarting it would not help.
+        bridge_silent_s=max(_silent_s(carrying, asked), default=None),
         ready=not problems,
-        problems=(*problems, *named, *_failing_cameras(failing)),
+        problems=(
+            *problems,
+            *named,
+            *_failing_bridges(carrying, asked),
+            *_failing_cameras(failing),
+        ),
     )
 
 
@@ -99,6 +121,16 @@ def _disk_problems(settings: Settings, free_mb: float) -> list[str]:
 def _lost(settings: Settings, silent_s: float | None) -> str:
     heard = "none was ever heard of" if silent_s is None else f"silent for {silent_s:.0f} s"
     return f"worker: {heard}; up to {settings.worker_lost_s:g} s are waited for"
+
+
+def _silent_s(known: Sequence[BridgeRecord], now: datetime) -> list[float]:
+    running = [record for record in known if not record.stopped]
+    return [abs((now - record.heartbeat_at).total_seconds()) for record in running]
+
+
+def _failing_bridges(known: Sequence[BridgeRecord], now: datetime) -> list[str]:
+    found = [problem_of(record, now) for record in known]
+    return [f"bridge: {in_words((problem,))}" for problem in found if problem is not None]
 
 
 def _failing_cameras(failing: dict[str, CameraRecord]) -> list[str]:
@@ -149,6 +181,7 @@ class Metrics:
     failing: tuple[str, ...]
     queue_lag_s: float
     events: int
+    bridges: Sequence[BridgeRecord]
 
 
 def load_metrics(session: Session, settings: Settings) -> Metrics:
@@ -171,6 +204,7 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
         failing=tuple(camera.id for camera in cameras.failing(session)),
         queue_lag_s=max(unseen_s.values(), default=0.0),
         events=journal.newest_event_id(session),
+        bridges=bridges.every(session),
     )
 
 

@@ -5,10 +5,12 @@ from datetime import UTC, datetime, timedelta
 
 from sqlalchemy.orm import Session
 
+from service.alerts.bridges import problem_of
 from service.settings import Settings
-from service.store import cameras, reports, tracks, webhooks, workers
+from service.store import bridges, cameras, reports, tracks, webhooks, workers
 from service.store.engines.dialects import now_in
 from service.wording.language import _
+from service.wording.reasons import in_words
 
 LONGEST_LAG = timedelta(seconds=60)
 _NAMED = 3
@@ -27,6 +29,7 @@ def find_troubles(session: Session, settings: Settings) -> list[Trouble]:
     return [
         *_of_workers(session, settings),
         *_of_the_queue(session),
+        *_of_bridges(session),
         *_of_webhooks(session),
         *_of_reports(session, settings),
     ]
@@ -66,6 +69,19 @@ def _of_the_queue(session: Session) -> list[Trouble]:
             some += " " + _("and {n} more", n=len(failing) - _NAMED)
         since = failing[0].estimate_failing_since
         found.append(Trouble(words=_("Looks at {cameras} fail", cameras=some), since=since))
+    return found
+
+
+def _of_bridges(session: Session) -> list[Trouble]:
+    now, found = now_in(session), []
+    for record in bridges.every(session):
+        problem = problem_of(record, now)
+        if problem is not None:
+            words = in_words((problem,))
+            found.append(Trouble(words=words[0].upper() + words[1:], since=record.heartbeat_at))
+        elif not record.stopped and not record.report.get("connected"):
+            words = _("The MQTT bridge {name} is not connected to its broker", name=record.name)
+            found.append(Trouble(words=words, since=None))
     return found
 
 

@@ -1,4 +1,4 @@
-"""`/ui/health`: workers, queue and webhooks; and the banner of every page of what is wrong."""
+"""`/ui/health`: workers, queue, bridges and webhooks; and the banner on every page of troubles."""
 
 from datetime import UTC, datetime
 
@@ -11,7 +11,7 @@ from service.api.middleware.pages import render
 from service.enums import TokenScope
 from service.notifications.webhooks import list_webhooks
 from service.operations.troubles import find_troubles
-from service.store import cameras, pictures, tracks, workers
+from service.store import bridges, cameras, pictures, tracks, workers
 from service.wording.times import Clock
 
 router = APIRouter(include_in_schema=False)
@@ -28,6 +28,7 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
         clock=Clock(now=datetime.now(UTC), zone=state.settings.zone),
         troubles=find_troubles(session, state.settings),
         workers=workers.every(session),
+        bridges=bridges.every(session),
         waiting=len(came),
         oldest=min(came, default=None),
         failing=cameras.failing(session),

@@ -244,6 +244,16 @@ def firing_group(session: Session, track_source: str, kind: AlertKind) -> AlertR
     return session.scalars(query.where(AlertRecord.camera_id.is_(None))).first()
 
 
+def newest_group(session: Session, track_source: str, kind: AlertKind) -> AlertRecord | None:
+    """The alert about all of a source of tracks that was opened last, or None."""
+    query = select(AlertRecord).where(
+        AlertRecord.camera_id.is_(None),
+        AlertRecord.track_source == track_source,
+        AlertRecord.kind == kind,
+    )
+    return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(1)).first()
+
+
 def firing_members(session: Session, group_id: str) -> Sequence[AlertRecord]:
     """The open alerts that a group is made of."""
     query = _all_firing(AlertRecord.group_id == group_id)
@@ -260,7 +270,8 @@ def groups_without_members(session: Session) -> Sequence[AlertRecord]:
     """Open groups none of whose members is: their cameras are gone."""
     member = aliased(AlertRecord)
     of_group = exists().where(member.group_id == AlertRecord.id, member.state == AlertState.FIRING)
-    return session.scalars(_all_firing(AlertRecord.camera_id.is_(None), ~of_group)).all()
+    groups = AlertRecord.camera_id.is_(None), AlertRecord.kind.in_(MEMBER_KINDS)
+    return session.scalars(_all_firing(*groups, ~of_group)).all()
 
 
 def silences_over(session: Session, now: datetime) -> Sequence[AlertRecord]:

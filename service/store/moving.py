@@ -15,7 +15,7 @@ from service.store.record import Record
 _BITE = 2_000
 _SUM = 2**256
 # Of the processes of the machine that the file was on, and of the server itself.
-_LEFT = ("workers", "store_probes", "weights")
+_LEFT = ("workers", "bridges", "store_probes", "weights")
 Row = tuple[Any, ...]
 Progress = Callable[[str, int, int], None]  # table, done, total
 

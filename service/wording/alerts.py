@@ -117,6 +117,7 @@ ANSWERED = {
 # Notes on alerts that ended by themselves.
 TRACKS_COME_AGAIN = N_("tracks come again")
 ESTIMATED_AGAIN = N_("its tracks are looked at again")
+BRIDGE_WORKS = N_("the bridge works again")
 ONE_SOURCE_POSTS = N_("only one source posts")
 _TOLD_AS = {
     AlertKind.DRIFT: N_("it is told as drift now"),

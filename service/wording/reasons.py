@@ -394,6 +394,18 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         limit=v["limit_s"] / 60,
     ),
     ServiceCode.TRACKS_LEFT_OUT: _left_out,
+    ServiceCode.BRIDGE_SILENT: lambda v: _(
+        "the MQTT bridge {bridge} has not reported for {minutes:.0f} min: tracks that it carries "
+        "do not arrive",
+        minutes=v["silent_s"] / 60,
+        **v,
+    ),
+    ServiceCode.BRIDGE_RESTARTS: lambda v: _(
+        "the MQTT bridge {bridge} was started {starts} times within {minutes:.0f} min",
+        minutes=v["within_s"] / 60,
+        **v,
+    ),
+    ServiceCode.BRIDGE_ENDS: N_("the MQTT bridge {bridge} does not keep running: {error}"),
     ServiceCode.DISABLED_BY_PERSON: N_("disabled by a person"),
     ServiceCode.ENDPOINT_GONE: N_("it answered 410: it is gone for good"),
     ServiceCode.ENDPOINT_FAILS: N_("it failed for more than {patience_s_in_h:g} h: {error}"),

@@ -43,6 +43,14 @@ class Address:
         """True for `mqtts`."""
         return urlsplit(self.url).scheme == "mqtts"
 
+    def tls_context(self) -> ssl.SSLContext:
+        """The certificates that the broker's is checked by.
+
+        Raises:
+            OSError: `ca_file` cannot be read, or has no certificate.
+        """
+        return ssl.create_default_context(cafile=self.ca_file)
+
     @property
     def host_and_port(self) -> tuple[str, int]:
         """Where it listens."""
@@ -84,8 +92,7 @@ class Broker:
         if address.user is not None:
             client.username_pw_set(address.user, address.password)
         if address.uses_tls:
-            context = ssl.create_default_context(cafile=address.ca_file)
-            client.tls_set_context(context)
+            client.tls_set_context(address.tls_context())
         self._address = address
 
     def start(self) -> None:
@@ -99,6 +106,11 @@ class Broker:
             host, port, _KEEPALIVE_S, clean_start=False, properties=properties
         )
         self._client.loop_start()
+
+    @property
+    def connected(self) -> bool:
+        """True while messages come."""
+        return self._connected
 
     def say(self, topic: str, payload: str) -> None:
         """Publish a retained message if it is news; an empty one takes the topic away."""
@@ -157,4 +169,8 @@ class Broker:
         self._note_connection(False)
 
     def _on_message(self, _: Client, __: Any, message: MQTTMessage) -> None:
-        self.inbox.add(message.topic, bytes(message.payload), message.mid, message.qos)
+        try:
+            topic = message.topic
+        except UnicodeDecodeError:  # not every broker checks; an error would end paho's thread
+            topic = repr(bytes(message._topic))
+        self.inbox.add(topic, bytes(message.payload), message.mid, message.qos)

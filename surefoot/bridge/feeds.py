@@ -12,7 +12,9 @@ from surefoot.bridge.values import Found, MessageError, check_size
 
 _CAMERA = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
 _SIZE = re.compile(r"([1-9][0-9]{0,5})x([1-9][0-9]{0,5})")
-_FORMATS = "axis, onvif-normalised, onvif-transformed, onvif-grid, deepstream-1920x1080"
+_FORMATS = ", ".join(
+    ["axis", *(f"onvif-{profile}" for profile in onvif.Profile), "deepstream-1920x1080"]
+)
 _CHANNELS = range(2, 9)  # of a device with several sensors
 _MOST_KNOWN = 10_000  # topics whose feed is remembered
 
@@ -128,13 +130,12 @@ def _read_axis(message: bytes, name: str, camera_of: Callable[[str], str]) -> li
     channels = {1: camera_of(name)}
     for number in _CHANNELS:
         channels[number] = f"{channels[1][:60]}-{number}"
-    return list(axis.read_frame(message, channels))
+    return list(axis.read_message(message, channels))
 
 
 def _onvif_reader(profile: onvif.Profile) -> _Read:
     def read(message: bytes, name: str, camera_of: Callable[[str], str]) -> list[Found]:
-        is_xml = message[:1] == b"<"
-        reader = onvif.read_xml if is_xml else onvif.read_json
+        reader = onvif.read_xml if onvif.is_xml(message) else onvif.read_json
         return list(reader(message, camera_of(name), profile))
 
     return read
@@ -142,7 +143,7 @@ def _onvif_reader(profile: onvif.Profile) -> _Read:
 
 def _deepstream_reader(size: tuple[float, float]) -> _Read:
     def read(message: bytes, _: str, camera_of: Callable[[str], str]) -> list[Found]:
-        return list(deepstream.read_frame(message, camera_of, size))
+        return list(deepstream.read_message(message, camera_of, size))
 
     return read
 

@@ -1,11 +1,15 @@
 """The plain topic's frames: `{"time_s", "size" or "normalised", "detections", "ended"}`."""
 
+from typing import Any
+
 from surefoot.bridge.values import (
     NORMALISED,
     Detection,
     Ended,
     MessageError,
-    listed,
+    SkippedRow,
+    box_of,
+    each_row,
     number,
     parsed_json,
     table,
@@ -13,14 +17,14 @@ from surefoot.bridge.values import (
 )
 
 
-def read_frame(message: bytes, camera: str) -> list[Detection | Ended]:
+def read_frame(message: bytes, camera: str) -> list[Detection | Ended | SkippedRow]:
     """The detections `{"id", "box": [x1, y1, x2, y2], "class"}` of a frame, and ids that ended.
 
     Boxes are pixels of `size` [width, height], shares where `normalised` is true, else pixels of
     the camera's own picture.
 
     Raises:
-        MessageError: it is no such frame.
+        MessageError: the message is no frame.
     """
     frame = table(parsed_json(message), "frame")
     time_s = number(frame.get("time_s"), "time_s")
@@ -30,17 +34,21 @@ def read_frame(message: bytes, camera: str) -> list[Detection | Ended]:
     elif frame.get("size") is not None:
         width, height = _numbers(frame["size"], 2, "size")
         size = (width, height)
-    found: list[Detection | Ended] = []
-    for at, each in enumerate(listed(frame.get("detections"), "detections")):
-        where = f"detections/{at}"
-        seen = table(each, where)
+
+    def detection(row: Any, where: str) -> Detection:
+        seen = table(row, where)
         track_id = text(seen.get("id"), f"{where}/id")
         label = None if seen.get("class") is None else text(seen["class"], f"{where}/class")
-        x1, y1, x2, y2 = _numbers(seen.get("box"), 4, f"{where}/box")
-        found.append(Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size))
-    for at, each in enumerate(listed(frame.get("ended"), "ended")):
-        found.append(Ended(camera, text(each, f"ended/{at}")))
-    return found
+        box = box_of(_numbers(seen.get("box"), 4, f"{where}/box"), f"{where}/box")
+        return Detection(camera, time_s, track_id, label, box, size)
+
+    def ended(row: Any, where: str) -> Ended:
+        return Ended(camera, text(row, where))
+
+    return [
+        *each_row(frame.get("detections"), "detections", detection),
+        *each_row(frame.get("ended"), "ended", ended),
+    ]
 
 
 def _numbers(value: object, count: int, what: str) -> list[float]:

@@ -6,11 +6,21 @@ from typing import TypeAlias
 
 import msgspec
 
-from surefoot.bridge.values import NORMALISED, MessageError, WholeTrack, check_size, text
+from surefoot.bridge.values import (
+    MAX_MESSAGE_BYTES,
+    NORMALISED,
+    MessageError,
+    SkippedRow,
+    WholeTrack,
+    check_json,
+    each_row,
+    text,
+)
 
 PERSON = "person"
 CameraOf: TypeAlias = Callable[[str], str]  # our name of a camera of Frigate's
 _Point: TypeAlias = tuple[tuple[float, float], float]
+MAX_ANSWER_BYTES = 64 * MAX_MESSAGE_BYTES
 # Feet as low as this are cut off by the picture's edge: they are no feet.
 _LOWEST = 0.99
 
@@ -45,7 +55,8 @@ class _Data(msgspec.Struct):
 
 
 _read = msgspec.json.Decoder(_Event).decode
-_read_stored = msgspec.json.Decoder(list[Stored]).decode
+_read_rows = msgspec.json.Decoder(list[msgspec.Raw]).decode
+_read_stored = msgspec.json.Decoder(Stored).decode
 _read_data = msgspec.json.Decoder(_Data | None).decode
 
 
@@ -57,7 +68,7 @@ def read_event(message: bytes, camera_of: CameraOf) -> WholeTrack | None:
     Raises:
         MessageError: it is none of Frigate's, or of one before 0.16.
     """
-    check_size(message)
+    check_json(message)
     try:
         event = _read(message)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
@@ -68,16 +79,25 @@ def read_event(message: bytes, camera_of: CameraOf) -> WholeTrack | None:
     return _track(after, after.path_data, camera_of, "after.")
 
 
-def read_stored(answer: bytes) -> list[Stored]:
-    """The events of an answer of `/api/events`.
+def read_stored(answer: bytes) -> list[Stored | SkippedRow]:
+    """The events of an answer of `/api/events`; one that cannot be read is skipped.
 
     Raises:
-        MessageError: it is none of Frigate's.
+        MessageError: the answer is none of Frigate's.
     """
+    check_json(answer, MAX_ANSWER_BYTES)
     try:
-        return _read_stored(answer)
+        rows = _read_rows(answer)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise MessageError("malformed", f"no events of Frigate's: {error}") from error
+    return list(each_row(rows, "events", _stored))
+
+
+def _stored(row: msgspec.Raw, where: str) -> Stored:
+    try:
+        return _read_stored(row)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise MessageError("malformed", f"{where}: {error}") from error
 
 
 def track_of(event: Stored, camera_of: CameraOf) -> WholeTrack | None:
@@ -88,7 +108,7 @@ def track_of(event: Stored, camera_of: CameraOf) -> WholeTrack | None:
     """
     if event.end_time is None or event.label != PERSON or event.false_positive:
         return None
-    check_size(bytes(event.data))
+    check_json(bytes(event.data))
     try:
         data = _read_data(event.data)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:

@@ -15,16 +15,22 @@ from typing import Any
 import httpx
 
 from surefoot.bridge.backlog import Backlog
-from surefoot.bridge.frigate import PERSON, CameraOf, Stored, read_stored, track_of
+from surefoot.bridge.frigate import (
+    MAX_ANSWER_BYTES,
+    PERSON,
+    CameraOf,
+    Stored,
+    read_stored,
+    track_of,
+)
 from surefoot.bridge.spool import Part, Spool
-from surefoot.bridge.values import MAX_MESSAGE_BYTES, MessageError
+from surefoot.bridge.values import MessageError, SkippedRow
 
 log = logging.getLogger("surefoot.bridge")
 
 SOURCE = "frigate"
 PAGE = 50  # events of an answer
 _MOST_PAGE = 800  # where so many began in one frame
-_MOST_BYTES = 64 * MAX_MESSAGE_BYTES  # of an answer
 _LONGEST_S = 3600.0 + 60.0  # that the service takes of a track, and what Frigate puts before it
 _OVERLAP_S = 60.0  # by which ends may be out of order
 _SAME_S = 1e-3
@@ -101,6 +107,10 @@ class History:
         for events in self._pages(http, stopping):
             parts = []
             for event in events:
+                if isinstance(event, SkippedRow):
+                    refused[event.code] += 1
+                    first = first or event.detail
+                    continue
                 if event.end_time is None or event.end_time < mark - _OVERLAP_S:
                     continue
                 newest = max(newest, event.end_time)
@@ -120,7 +130,9 @@ class History:
         self.spool.keep(0.0, None, [], marks={SOURCE: min(newest, time.time())})
         log.info("frigate_asked", extra={"kept": kept, "refused": dict(refused), "first": first})
 
-    def _pages(self, http: httpx.Client, stopping: threading.Event) -> Iterator[list[Stored]]:
+    def _pages(
+        self, http: httpx.Client, stopping: threading.Event
+    ) -> Iterator[list[Stored | SkippedRow]]:
         """Events by their start, none twice; where many begin in one frame, pages grow."""
         size = PAGE
         while not stopping.is_set():
@@ -129,19 +141,20 @@ class History:
                 continue
             assert self._at is not None
             page = _ask(http, after=self._at - _SAME_S, limit=size)
-            fresh = [event for event in page if event.id not in self._seen]
-            yield fresh
+            known = [event for event in page if isinstance(event, Stored)]
+            fresh = [event for event in known if event.id not in self._seen]
+            yield [*fresh, *(event for event in page if isinstance(event, SkippedRow))]
             if len(page) < size:
                 return
-            last = max(event.start_time for event in page)
-            ids = {event.id for event in page}
+            last = max((event.start_time for event in known), default=self._at)
+            ids = {event.id for event in known}
             self._seen = ids if last - self._at > _SAME_S else self._seen | ids
             self._at = last
             if not fresh and (size := 2 * size) > _MOST_PAGE:
                 raise HistoryError(f"over {_MOST_PAGE} events that start at {last}")
 
 
-def _ask(http: httpx.Client, after: float, limit: int) -> list[Stored]:
+def _ask(http: httpx.Client, after: float, limit: int) -> list[Stored | SkippedRow]:
     """Ended people that started after a time, the first so many.
 
     Raises:
@@ -158,8 +171,8 @@ def _ask(http: httpx.Client, after: float, limit: int) -> list[Stored]:
                 raise HistoryError(f"/api/events answers {answer.status_code}")
             for piece in answer.iter_bytes():
                 found += piece
-                if len(found) > _MOST_BYTES:
-                    raise HistoryError(f"/api/events: at most {_MOST_BYTES} bytes are taken")
+                if len(found) > MAX_ANSWER_BYTES:
+                    raise HistoryError(f"/api/events: at most {MAX_ANSWER_BYTES} bytes are taken")
         return read_stored(bytes(found))
     except (httpx.HTTPError, MessageError) as error:
         raise HistoryError(f"{type(error).__name__}: {error}") from error

@@ -42,6 +42,11 @@ class Inbox:
         self._unasked_bytes = self._dropped = 0
         self._told_s = -_TELL_S
 
+    @property
+    def dropped(self) -> int:
+        """Messages of QoS 0 for which there was no room."""
+        return self._dropped
+
     def begin(self) -> None:
         """Forget what came with QoS 1: the connection by which it could be acknowledged is over."""
         with self._changed:

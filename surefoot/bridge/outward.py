@@ -34,6 +34,7 @@ class Outward:
     availability: str
     discovery: str | None
     version: str
+    note_camera: Callable[[str], object] = lambda _: None  # an event is about this camera
     _known: set[str] = field(default_factory=set)
     _changed: set[str] = field(default_factory=set)
     _all_changed: bool = True
@@ -84,9 +85,12 @@ class Outward:
 
     def _note(self, event: dict[str, Any]) -> None:
         """Remember of whom an event is: a pose's or a training's camera, or all of a group's."""
-        cameras = [event.get("camera_id"), *(event.get("camera_ids") or ())]
+        named = [event.get("camera_id"), *(event.get("camera_ids") or ())]
+        cameras = [each for each in named if each is not None]
+        for each in cameras:
+            self.note_camera(each)
         with self._news:
-            self._changed.update(each for each in cameras if each is not None)
+            self._changed.update(cameras)
             self._news.notify()
 
     def _note_all(self) -> None:

@@ -1,4 +1,4 @@
-"""Tracks from the spool to the service, as long as it takes: what fails is told, and waits."""
+"""Tracks from the spool to the service, as long as it takes: what fails is logged, and waits."""
 
 import logging
 import threading
@@ -8,14 +8,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from surefoot.bridge.backlog import Backlog
+from surefoot.bridge.door import Door
 from surefoot.bridge.service import LaterError, RefusedError, Service
 from surefoot.bridge.spool import Group, Spool
+from surefoot.bridge.tally import Tally
 from surefoot.bridge.values import body_of
 
 log = logging.getLogger("surefoot.bridge")
 
 _GATHER_S = 1.0  # so that what ends at about the same time is one post
 _FIRST_S, _LONGEST_S = 0.5, 30.0  # between two attempts
+_NOT_FOUND = 404
 MOST_HELD = 1_000  # tracks that the service trips over, before all is left to wait
 
 
@@ -25,6 +28,8 @@ class Posting:
 
     spool: Spool
     service: Service
+    door: Door
+    tally: Tally
     _backlog: Backlog = field(default_factory=Backlog)
     _held: dict[int, tuple[float, float]] = field(default_factory=dict)  # again at, then after, s
 
@@ -70,14 +75,36 @@ class Posting:
         """
         bodies = list(group.tracks.values())
         body = body_of(group.head, bodies) if group.head else bodies[0]
+        unknown = False
         try:
             receipt = self.service.post_tracks(group.camera, body)
+            self.tally.posted(group.camera, receipt["accepted"])
+            self.tally.count("tracks_rejected", len(receipt["rejected"]))
             _tell_rejected(group.camera, receipt["rejected"])
         except RefusedError as error:
+            unknown = error.status == _NOT_FOUND
+            self.tally.count("tracks_rejected", len(group.tracks))
             _tell_refused(group, error)
         self.spool.drop(group)
+        if unknown:
+            self._drop_unknown()
         for number in group.tracks:
             self._held.pop(number, None)
+
+    def _drop_unknown(self) -> None:
+        """Delete at once what waits for cameras that the service does not have.
+
+        It was kept while the service did not answer; posting it one by one would delay the rest.
+        """
+        newest = self.spool.newest()  # what comes later may be for a camera that is new by then
+        cameras = self.door.cameras()
+        if cameras is None:
+            return
+        dropped = self.spool.drop_others(cameras, newest)
+        if dropped:
+            extra = {"tracks": dropped.total(), "cameras": len(dropped), "first": min(dropped)}
+            log.warning("tracks_dropped", extra=extra)
+            self.tally.count("tracks_rejected", dropped.total())
 
     def _hold(self, group: Group, now_s: float) -> None:
         for number in group.tracks:

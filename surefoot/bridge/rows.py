@@ -1,7 +1,7 @@
 """Rows of boxes: supervision's CSVSink and JSONSink, Ultralytics' `save_txt` and `summary()`."""
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from io import StringIO
 from typing import Any, NamedTuple
 
@@ -11,8 +11,10 @@ from surefoot.bridge.values import (
     NORMALISED,
     Detection,
     MessageError,
+    SkippedRow,
+    check_json,
     check_size,
-    listed,
+    each_row,
     number,
     parsed_json,
     table,
@@ -36,7 +38,7 @@ class Clock(NamedTuple):
 
 def read_supervision_csv(
     file: bytes, camera: str, clock: Clock, size: tuple[float, float] | None
-) -> Iterator[Detection]:
+) -> Iterator[Detection | SkippedRow]:
     """The tracked boxes of a CSVSink's file, in pixels of a picture of that size.
 
     Raises:
@@ -52,21 +54,21 @@ def read_supervision_csv(
 
 def read_supervision_json(
     file: bytes, camera: str, clock: Clock, size: tuple[float, float] | None
-) -> Iterator[Detection]:
+) -> Iterator[Detection | SkippedRow]:
     """The tracked boxes of a JSONSink's file, in pixels of a picture of that size.
 
     Raises:
         MessageError: it is none.
     """
-    check_size(file, MAX_FILE_BYTES)
+    check_json(file, MAX_FILE_BYTES)
     try:
-        rows = msgspec.json.decode(file, type=list[dict[str, Any]])
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        rows = msgspec.json.decode(file, type=list[Any])
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise MessageError("malformed", f"no list of rows: {error}") from error
     yield from _supervision(rows, camera, clock, size)
 
 
-def read_ultralytics_text(lines: bytes, camera: str, time_s: float) -> list[Detection]:
+def read_ultralytics_text(lines: bytes, camera: str, time_s: float) -> list[Detection | SkippedRow]:
     """The tracked boxes of one frame's `save_txt`: `class xc yc w h [conf] id`, shares.
 
     Of six columns the last is an id where it is a whole number, else a confidence.
@@ -75,67 +77,72 @@ def read_ultralytics_text(lines: bytes, camera: str, time_s: float) -> list[Dete
         MessageError: it is none; of a model that segments, lines are outlines.
     """
     check_size(lines)
-    found = []
-    for at, line in enumerate(lines.decode("utf-8", errors="replace").splitlines(), start=1):
+
+    def detection(line: str, where: str) -> Detection | None:
         cells = line.split()
         if not cells:
-            continue
+            return None
         if not 5 <= len(cells) <= 7:
             needed = "class xc yc w h [conf] id is needed"
-            raise MessageError("malformed", f"line {at}: {needed}, got {line!r:.80}")
-        kind, x, y, width, height = (number(cell, f"line {at}") for cell in cells[:5])
+            raise MessageError("malformed", f"{where}: {needed}, got {line!r:.80}")
+        kind, x, y, width, height = (number(cell, where) for cell in cells[:5])
         if len(cells) == 5 or not cells[-1].isdecimal():
-            continue
+            return None
         box = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
-        track_id = text(cells[-1], f"line {at}")
-        found.append(Detection(camera, time_s, track_id, _label(kind), box, NORMALISED))
-    return found
+        return Detection(camera, time_s, text(cells[-1], where), _label(kind), box, NORMALISED)
+
+    rows = lines.decode("utf-8", errors="replace").splitlines()
+    return list(each_row(rows, "lines", detection))
 
 
 def read_ultralytics_summary(
     message: bytes, camera: str, time_s: float, size: tuple[float, float]
-) -> list[Detection]:
+) -> list[Detection | SkippedRow]:
     """The tracked boxes of one frame's `results.to_json()`, in pixels of `orig_shape` as a size.
 
     Raises:
         MessageError: it is none.
     """
-    found = []
-    for at, each in enumerate(listed(parsed_json(message), "rows")):
-        row = table(each, f"{at}")
+
+    def detection(each: Any, where: str) -> Detection | None:
+        row = table(each, where)
         if row.get("track_id") is None:
-            continue
-        edges = table(row.get("box"), f"{at}/box")
+            return None
+        edges = table(row.get("box"), f"{where}/box")
         names = ("x1", "y1", "x2", "y2")
-        x1, y1, x2, y2 = (number(edges.get(name), f"{at}/box/{name}") for name in names)
-        label, track_id = text(row.get("name"), f"{at}/name"), text(row["track_id"], f"{at}")
-        found.append(Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size))
-    return found
+        x1, y1, x2, y2 = (number(edges.get(name), f"{where}/box/{name}") for name in names)
+        label, track_id = text(row.get("name"), f"{where}/name"), text(row["track_id"], where)
+        return Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size)
+
+    return list(each_row(parsed_json(message), "rows", detection))
 
 
 def _supervision(
-    rows: Iterable[Mapping[Any, Any]],
+    rows: Iterable[Any],
     camera: str,
     clock: Clock,
     size: tuple[float, float] | None,
-) -> Iterator[Detection]:
-    for at, row in enumerate(rows):
+) -> Iterator[Detection | SkippedRow]:
+    def detection(each: Any, where: str) -> Detection | None:
+        row = table(each, where)
         track_id = row.get("tracker_id")
         if track_id is None or track_id in ("", -1, "-1"):
-            continue
-        when = number(row.get(clock.column), f"{at}/{clock.column}")
+            return None
+        when = number(row.get(clock.column), f"{where}/{clock.column}")
         names = ("x_min", "y_min", "x_max", "y_max")
-        x1, y1, x2, y2 = (number(row.get(name), f"{at}/{name}") for name in names)
+        x1, y1, x2, y2 = (number(row.get(name), f"{where}/{name}") for name in names)
         named, kind = row.get("class_name"), row.get("class_id")
-        label = None if kind in (None, "") else _label(number(kind, f"{at}/class_id"))
-        yield Detection(
+        label = None if kind in (None, "") else _label(number(kind, f"{where}/class_id"))
+        return Detection(
             camera=camera,
             time_s=clock.started_at_s + when / clock.rate_hz,
-            track_id=text(track_id, f"{at}/tracker_id"),
-            label=text(named, f"{at}/class_name") if named else label,
+            track_id=text(track_id, f"{where}/tracker_id"),
+            label=text(named, f"{where}/class_name") if named else label,
             box=(x1, y1, x2, y2),
             size=size,
         )
+
+    return each_row(rows, "rows", detection)
 
 
 def _label(kind: float) -> str:

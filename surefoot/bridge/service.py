@@ -40,9 +40,9 @@ class Event(NamedTuple):
 class Service:
     """A client of one service, for one thread; `heard` is what a next stream goes on from."""
 
-    def __init__(self, url: str, token: str | None) -> None:
+    def __init__(self, url: str, token: str | None, timeout_s: float = _TIMEOUT_S) -> None:
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-        self._http = httpx.Client(base_url=url, headers=headers, timeout=_TIMEOUT_S)
+        self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s)
         self.heard: str | None = None
 
     def post_tracks(self, camera_id: str, body: bytes) -> dict[str, Any]:
@@ -87,6 +87,18 @@ class Service:
             RefusedError: nothing ever will.
         """
         return self._ask("POST", path, json=document)
+
+    def put(self, path: str, document: dict[str, Any]) -> None:
+        """Put a document at a path whose answer has no body.
+
+        Raises:
+            LaterError: it is not stored for now.
+            RefusedError: it never will be.
+        """
+        try:
+            _check(self._http.put(path, json=document))
+        except httpx.RequestError as error:
+            raise LaterError(f"{type(error).__name__}: {error}", away=True) from error
 
     def readiness(self) -> dict[str, Any]:
         """The document of `/readyz`, which is answered with 503 where the service is not ready.

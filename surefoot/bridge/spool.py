@@ -3,30 +3,58 @@
 A message is acknowledged once it is here. The assemblers' state is saved now and then; what they
 were given since then lies beside it, and makes them anew after a crash. All of one step, finished
 tracks too, is one transaction.
+
+A file that is damaged, or no database of a bridge, is moved aside, and a new one is begun.
 """
 
 import contextlib
+import logging
 import sqlite3
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
 
+log = logging.getLogger("surefoot.bridge")
+
 MAX_GROUP_TRACKS, MAX_GROUP_BYTES = 200, 1024 * 1024  # of a post
 _SAVE_FROM_BYTES = 8 * 1024 * 1024  # of what came since the state was saved
+_MOST_SCANNED = 10 * MAX_GROUP_TRACKS  # of a camera's tracks, for those that go in one post
 _TABLES = """
 CREATE TABLE IF NOT EXISTS posts (
     number INTEGER PRIMARY KEY AUTOINCREMENT, camera TEXT, head BLOB, track BLOB);
-CREATE INDEX IF NOT EXISTS posts_alike ON posts (camera, head, number);
+CREATE INDEX IF NOT EXISTS posts_of_camera ON posts (camera, number);
 CREATE TABLE IF NOT EXISTS given (number INTEGER PRIMARY KEY, at_s REAL, found BLOB);
 CREATE TABLE IF NOT EXISTS marks (source TEXT PRIMARY KEY, until_s REAL);
 CREATE TABLE IF NOT EXISTS saved (number INTEGER PRIMARY KEY CHECK (number = 0), state BLOB);
+CREATE TABLE IF NOT EXISTS under_way (digest BLOB PRIMARY KEY);
+CREATE TABLE IF NOT EXISTS suspects (digest BLOB PRIMARY KEY, crashes INTEGER, at_s REAL);
+CREATE TABLE IF NOT EXISTS set_aside (
+    digest BLOB PRIMARY KEY, at_s REAL, topic TEXT, payload BLOB);
 """
+# Read once at the start: a table of another program has other columns.
+_COLUMNS = {
+    "posts": "number, camera, head, track",
+    "given": "number, at_s, found",
+    "marks": "source, until_s",
+    "saved": "number, state",
+    "under_way": "digest",
+    "suspects": "digest, crashes, at_s",
+    "set_aside": "digest, at_s, topic, payload",
+}
+# What is wrong with the file itself; all other errors are of the disk, or of another process.
+_DAMAGED = {sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR}
 
 
 class SpoolError(Exception):
-    """The file cannot be had: another bridge has it, or it is none of ours."""
+    """The file cannot be used: another bridge has it open, or the disk refuses."""
+
+
+class _DamagedError(Exception):
+    """The file is damaged, or no database of a bridge."""
 
 
 @dataclass(frozen=True)
@@ -54,19 +82,20 @@ class Spool:
         self._max_bytes = max_bytes
         self._lock = threading.Lock()
         self._news = threading.Condition(self._lock)
+        self._last_camera = ""  # posted for last: the next turn is another's
         try:
-            self._db = sqlite3.connect(
-                path, isolation_level=None, check_same_thread=False, timeout=1.0
-            )
-            for line in ("locking_mode = EXCLUSIVE", "journal_mode = WAL", "synchronous = FULL"):
-                self._db.execute(f"PRAGMA {line}")
-            self._db.executescript(f"BEGIN IMMEDIATE; {_TABLES} COMMIT;")
+            try:
+                self._db = _opened(path)
+            except _DamagedError as error:
+                _move_aside(path, str(error))
+                self._db = _opened(path)
             self.waiting, self._bytes = self._ask(
                 "SELECT count(*), coalesce(sum(length(head) + length(track)), 0) FROM posts"
             )
             (self._given_bytes,) = self._ask("SELECT coalesce(sum(length(found)), 0) FROM given")
-        except sqlite3.Error as error:
+        except (sqlite3.Error, _DamagedError, OSError) as error:
             raise SpoolError(f"{path}: {error}; each bridge needs a file of its own") from error
+        self.moved_aside = len(list(path.parent.glob(f"{path.name}.damaged-*[0-9Z]")))
 
     def close(self) -> None:
         """Let another process have the file."""
@@ -139,29 +168,28 @@ class Spool:
             self._news.wait_for(lambda: self.waiting, wait_s)
 
     def next(self, but: Iterable[int], alone: Iterable[int]) -> Group | None:
-        """What has waited longest and can go in one post.
+        """The tracks of one post. Cameras take turns; of each the oldest go first.
 
-        Numbers in `but` are left out for now, those in `alone` go in a post by themselves.
+        Numbers in `but` are omitted for now, those in `alone` go in a post by themselves.
         """
         left_out, by_itself = set(but), set(alone)
         with self._lock:
-            rows = self._db.execute("SELECT number, camera, head FROM posts ORDER BY number")
-            first = next((row for row in rows if row[0] not in left_out), None)
-            rows.close()
+            first = self._first(left_out)
             if first is None:
                 return None
-            number, camera, head = first
+            number, self._last_camera, head = first
             if not head or number in by_itself:
                 query, left_out = "SELECT number, track FROM posts WHERE number = ?", set()
                 alike = self._db.execute(query, (number,))
             else:
                 alike = self._db.execute(
-                    "SELECT number, track FROM posts WHERE camera = ? AND head = ? "
-                    "AND number >= ? ORDER BY number LIMIT ?",
-                    (camera, head, number, MAX_GROUP_TRACKS),
+                    "SELECT number, track FROM (SELECT number, head, track FROM posts "
+                    "WHERE camera = ? AND number >= ? ORDER BY number LIMIT ?) "
+                    "WHERE head = ? ORDER BY number LIMIT ?",
+                    (self._last_camera, number, _MOST_SCANNED, head, MAX_GROUP_TRACKS),
                 )
                 left_out |= by_itself
-            group = Group(camera, head)
+            group = Group(self._last_camera, head)
             size = 0
             for each, track in alike:
                 size += len(track)
@@ -170,6 +198,62 @@ class Spool:
                 if each not in left_out:
                     group.tracks[each] = track
             return group
+
+    def _first(self, left_out: set[int]) -> tuple[int, str, bytes] | None:
+        """The oldest track of the next camera that has one, after the camera of the last post."""
+        after, begun_again = self._last_camera, False
+        while True:
+            camera: str | None = self._db.execute(
+                "SELECT min(camera) FROM posts WHERE camera > ?", (after,)
+            ).fetchone()[0]
+            if camera is None or (begun_again and camera > self._last_camera):
+                if begun_again:
+                    return None
+                after, begun_again = "", True
+                continue
+            rows = self._db.execute(
+                "SELECT number, camera, head FROM posts WHERE camera = ? ORDER BY number", (camera,)
+            )
+            first: tuple[int, str, bytes] | None = next(
+                (row for row in rows if row[0] not in left_out), None
+            )
+            rows.close()
+            if first is not None:
+                return first
+            after = camera
+
+    def newest(self) -> int:
+        """The number of the track that was kept last; 0 if none waits."""
+        return self._ask("SELECT coalesce(max(number), 0) FROM posts")[0]
+
+    def drop_others(self, cameras: Collection[str], until: int) -> Counter[str]:
+        """Delete what waits for other cameras, up to a number; return how many tracks of each."""
+        with self._lock, _transaction(self._db):
+            counts = self._db.execute(
+                "SELECT camera, count(*), sum(length(head) + length(track)) FROM posts "
+                "WHERE number <= ? GROUP BY camera",
+                (until,),
+            ).fetchall()
+            others = [row for row in counts if row[0] not in cameras]
+            self._db.executemany(
+                "DELETE FROM posts WHERE camera = ? AND number <= ?",
+                [(camera, until) for camera, _, _ in others],
+            )
+            self.waiting -= sum(count for _, count, _ in others)
+            self._bytes -= sum(size for _, _, size in others)
+        return Counter({camera: count for camera, count, _ in others})
+
+    @contextlib.contextmanager
+    def transaction(self, *, durable: bool) -> Iterator[sqlite3.Connection]:
+        """One transaction; unless `durable`, it survives a crash of the process alone."""
+        with self._lock:
+            if not durable:
+                self._db.execute("PRAGMA synchronous = NORMAL")
+            try:
+                with _transaction(self._db):
+                    yield self._db
+            finally:
+                self._db.execute("PRAGMA synchronous = FULL")
 
     def drop(self, group: Group) -> None:
         """Forget what was posted, or will never be."""
@@ -195,3 +279,41 @@ def _transaction(db: sqlite3.Connection) -> Iterator[None]:
         db.execute("ROLLBACK")
         raise
     db.execute("COMMIT")
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """A connection to a sound file that this process alone has.
+
+    Raises:
+        sqlite3.Error: the disk refuses, or another process has the file.
+        _DamagedError: the file is damaged, or no database of a bridge.
+    """
+    db = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=1.0)
+    try:
+        for line in ("locking_mode = EXCLUSIVE", "journal_mode = WAL", "synchronous = FULL"):
+            db.execute(f"PRAGMA {line}")
+        db.executescript(f"BEGIN IMMEDIATE; {_TABLES} COMMIT;")
+        for name, columns in _COLUMNS.items():
+            db.execute(f"SELECT {columns} FROM {name} LIMIT 1").fetchone()
+        found = db.execute("PRAGMA quick_check(1)").fetchone()[0]
+        if found != "ok":
+            raise _DamagedError(str(found))
+    except sqlite3.Error as error:
+        db.close()
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGED:
+            raise _DamagedError(str(error)) from error
+        raise
+    except _DamagedError:
+        db.close()
+        raise
+    return db
+
+
+def _move_aside(path: Path, reason: str) -> None:
+    """Rename the file, and what SQLite has put beside it, for a person to look at."""
+    to = path.with_name(f"{path.name}.damaged-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
+    for end in ("", "-wal", "-shm", "-journal"):
+        beside = path.with_name(path.name + end)
+        if beside.exists():
+            beside.rename(to.with_name(to.name + end))
+    log.error("spool_moved_aside", extra={"path": str(path), "to": str(to), "reason": reason})

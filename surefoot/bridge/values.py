@@ -2,11 +2,13 @@
 
 import math
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
+
+from surefoot.nesting import MAX_LEVELS, json_levels
 
 Box: TypeAlias = tuple[float, float, float, float]
 
@@ -20,7 +22,7 @@ _FARTHEST = 1e9
 class MessageError(Exception):
     """A message that is not what its source's format says; `code` is stable, `detail` for people.
 
-    Codes: `too_large`, `malformed`, `not_finite`, `unsupported`.
+    Codes: `too_large`, `too_deep`, `malformed`, `not_finite`, `unsupported`.
     """
 
     def __init__(self, code: str, detail: str) -> None:
@@ -50,6 +52,13 @@ class Ended(msgspec.Struct, frozen=True, array_like=True, tag="ended"):
 
     camera: str
     track_id: str
+
+
+class SkippedRow(NamedTuple):
+    """A row of a message that could not be read, and why; the message's other rows were."""
+
+    code: str
+    detail: str
 
 
 class WholeTrack(NamedTuple):
@@ -87,7 +96,8 @@ class WholeTrack(NamedTuple):
         return msgspec.json.encode(head)
 
 
-Found: TypeAlias = Detection | Ended | WholeTrack
+Found: TypeAlias = Detection | Ended | WholeTrack | SkippedRow
+_Row = TypeVar("_Row")
 
 
 def body_of(head: bytes, tracks: Sequence[bytes]) -> bytes:
@@ -152,10 +162,10 @@ def parsed_json(message: bytes) -> Any:
     Raises:
         MessageError: it is too large, or none.
     """
-    check_size(message)
+    check_json(message)
     try:
         return msgspec.json.decode(message)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise MessageError("malformed", f"no JSON: {error}") from error
 
 
@@ -172,6 +182,42 @@ def listed(value: Any, what: str) -> list[Any]:
     return value
 
 
+def box_of(edges: Sequence[float], what: str) -> Box:
+    """The box with these edges (x1, y1, x2, y2), y down.
+
+    Raises:
+        MessageError: it has no area, or its sides are swapped: a source that counts upwards, or
+            that names width and height.
+    """
+    x1, y1, x2, y2 = edges
+    if not (x1 < x2 and y1 < y2):
+        needed = "left < right and top above bottom are needed"
+        raise MessageError("malformed", f"{what}: {needed}, got {x1:g}, {y1:g}, {x2:g}, {y2:g}")
+    return x1, y1, x2, y2
+
+
+def each_row(
+    rows: Any, what: str, read: Callable[[Any, str], _Row | None]
+) -> Iterator[_Row | SkippedRow]:
+    """Read the rows of a list one by one; a row that cannot be read is skipped, with its reason.
+
+    `read` gets a row and its place (`detections/3`), and returns None if there is nothing to use.
+    Of a message `rows` is what its field has, which may be no list; a file's rows may be iterated.
+
+    Raises:
+        MessageError: `rows` is no list.
+    """
+    given = rows if isinstance(rows, Iterator) else listed(rows, what)
+    for at, row in enumerate(given):
+        try:
+            found = read(row, f"{what}/{at}")
+        except MessageError as error:
+            yield SkippedRow(error.code, error.detail)
+            continue
+        if found is not None:
+            yield found
+
+
 def table(value: Any, what: str) -> dict[str, Any]:
     """An object of a message.
 
@@ -181,6 +227,18 @@ def table(value: Any, what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise MessageError("malformed", f"{what}: an object is needed, got {value!r:.40}")
     return value
+
+
+def check_json(message: bytes, most: int = MAX_MESSAGE_BYTES) -> None:
+    """Reject JSON that is too large, or nested too deeply, before it is parsed.
+
+    Raises:
+        MessageError: it is.
+    """
+    check_size(message, most)
+    levels = json_levels(message)
+    if levels > MAX_LEVELS:
+        raise MessageError("too_deep", f"at most {MAX_LEVELS} nested levels, got {levels}")
 
 
 def check_size(message: bytes, most: int = MAX_MESSAGE_BYTES) -> None:

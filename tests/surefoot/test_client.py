@@ -195,6 +195,65 @@ def test_a_track_is_never_longer_than_the_service_takes(monkeypatch, soon, tmp_p
     assert all(sum(len(t["boxes"]) for t in body["tracks"]) <= 25 for _, body in stub.seen)
 
 
+def test_spool_with_files_of_others_is_used_and_they_are_left_alone(soon, tmp_path):
+    spool = tmp_path / "spool"
+    spool.mkdir()
+    others = ("1a-2.json", "7-2x.json", "000000000009-1.json.bak", "notes.txt", "5-.json")
+    for name in others:
+        (spool / name).write_text("not ours")
+    with Stub(OK) as stub, Client(stub.url, "corner", spool=spool) as client:
+        walk(client, "1", time.time() - 60)
+    assert client.posted == Counter(accepted=1)
+    assert sorted(path.name for path in spool.iterdir()) == sorted(others)
+
+
+def test_file_of_the_spool_that_cannot_be_read_does_not_hold_up_the_others(soon, tmp_path):
+    spool = tmp_path / "spool"
+    (spool / "000000000001-3.json").mkdir(parents=True)
+    with Stub(OK) as stub, Client(stub.url, "corner", spool=spool) as client:
+        walk(client, "1", time.time() - 60)
+    assert client.posted == Counter(accepted=1, lost=3)
+    assert client.waiting == 0
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 500, b'{"source": "x", "tracks": [{"id"'])
+def test_file_of_the_spool_that_is_cut_off_is_rejected_and_the_next_is_stored(
+    server, soon, tmp_path, content
+):
+    spool = tmp_path / "spool"
+    spool.mkdir()
+    (spool / "000000000001-2.json").write_bytes(content)
+    with Client(server.url, "corner", spool=spool) as client:
+        walk(client, "1", time.time() - 60)
+    assert client.posted == Counter(accepted=1, refused=2)
+    assert list(spool.iterdir()) == []
+
+
+def test_spool_that_is_deleted_under_way_is_made_again(soon, tmp_path):
+    spool = tmp_path / "spool"
+    with Stub(OK) as stub, Client(stub.url, "corner", spool=spool) as client:
+        spool.rmdir()
+        walk(client, "1", time.time() - 60)
+    assert client.posted == Counter(accepted=1)
+
+
+def test_fault_of_the_spool_does_not_end_the_thread(soon, tmp_path, monkeypatch):
+    spool, faults = tmp_path / "spool", [OverflowError("once")]
+    keep = Client._keep_finished
+
+    def faulty(client):
+        if faults:
+            raise faults.pop()
+        keep(client)
+
+    monkeypatch.setattr(Client, "_keep_finished", faulty)
+    with Stub(OK) as stub, Client(stub.url, "corner", spool=spool) as client:
+        wait_for(lambda: not faults, every_s=0.02)
+        walk(client, "1", time.time() - 60)
+        client.end("1")
+        wait_for(lambda: client.posted == Counter(accepted=1), every_s=0.02)
+
+
 def test_only_a_web_address_is_one():
     with pytest.raises(ValueError, match="http"):
         Client("file:///etc", "corner")

@@ -21,7 +21,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "POST /ui/language",
         "POST /ui/login",
     ),
-    TokenScope.INGEST: ("POST /cameras/{camera_id}/tracks",),
+    TokenScope.INGEST: ("POST /cameras/{camera_id}/tracks", "PUT /bridges/{bridge}"),
     TokenScope.READ: (
         "GET /",
         "GET /activity",

@@ -40,6 +40,8 @@ def series(bench):
     for _ in range(3):
         bench.see(moved(tilt_deg=14.0))
     bench.http.post("/webhooks", json={"url": "http://1.1.1.1/"}).raise_for_status()
+    beat = {"started_at": "2026-11-20T08:00:00Z", "connected": True}
+    bench.http.put("/bridges/one", json=beat).raise_for_status()
     with bench.store.write() as session:
         register_worker(session, "local-0", 1)
         record = alerts.show_alert(session, bench.alerts()[0]["id"])

@@ -174,6 +174,12 @@ SAID = [
     (S.ENDPOINT_GONE, {}, "it answered 410: it is gone for good"),
     (S.ENDPOINT_FAILS, {"patience_s": 259200.0, "error": "answered 500"},
      "it failed for more than 72 h: answered 500"),
+    (S.BRIDGE_SILENT, {"bridge": "nvr-east", "silent_s": 660.0},
+     "the MQTT bridge nvr-east has not reported for 11 min: tracks that it carries do not arrive"),
+    (S.BRIDGE_RESTARTS, {"bridge": "nvr-east", "starts": 4, "within_s": 600.0},
+     "the MQTT bridge nvr-east was started 4 times within 10 min"),
+    (S.BRIDGE_ENDS, {"bridge": "nvr-east", "error": "ended by signal 11"},
+     "the MQTT bridge nvr-east does not keep running: ended by signal 11"),
     (S.SECRET_LOST, {},
      "its secret was lost with the key: fetch a new one, tell the receiver, enable it"),
 ]  # fmt: skip

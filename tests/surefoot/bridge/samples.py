@@ -14,6 +14,29 @@ AXIS = b"""{"channel_id": 1, "timestamp": "2026-11-20T08:00:00.250000Z",
  "track_events": [{"type": "TrackEnded", "object_track_id": "c3"},
   {"type": "Rename", "from_id": "d4", "to_id": "a1b2"}]}"""
 
+# The same, beta: com.axis.analytics_scene_description.v0.beta
+AXIS_BETA = b"""{"frame": {"timestamp": "2026-11-20T08:00:00.250000Z", "observations": [
+  {"track_id": "7", "timestamp": "2026-11-20T08:00:00.250000Z",
+   "bounding_box": {"left": 0.25, "top": 0.5, "right": 0.3, "bottom": 0.75},
+   "class": {"type": "Human", "score": 0.6,
+    "upper_clothing_colors": [{"name": "White", "score": 0.78}]},
+   "image": {"data": "/9j/4AAQSkZJRgABAQAAAQABAAD", "bounding_box":
+    {"left": 0.2, "top": 0.4, "right": 0.4, "bottom": 0.8}}}],
+ "operations": [{"type": "DeleteOperation", "id": "3"},
+  {"type": "RenameOperation", "from": "4", "to": "7"}]}}"""
+
+# Analytics Data Format, Consolidated track: com.axis.consolidated_track.v1.beta
+_AXIS_PATH = b"""[{"timestamp": "2026-11-20T08:00:00.250000Z",
+   "bounding_box": {"left": 0.25, "top": 0.5, "right": 0.3, "bottom": 0.75}},
+  {"timestamp": "2026-11-20T08:00:02.500000Z",
+   "bounding_box": {"left": 0.275, "top": 0.5, "right": 0.325, "bottom": 0.8}}]"""
+_AXIS_TRACK = b"""{"classes": [{"type": "Vehicle", "score": 0.2}, {"type": "Human", "score": 0.7}],
+ "start_time": "2026-11-20T08:00:00.250000Z", "end_time": "2026-11-20T08:00:02.500000Z",
+ "duration": 2.25, "image": {"data": "/9j/"}, "id": "7", """
+AXIS_CONSOLIDATED = _AXIS_TRACK + b'"observations": ' + _AXIS_PATH + b"}"
+# axis.scene.object_track_v1
+AXIS_OBJECT_TRACK = _AXIS_TRACK + b'"channel_id": 1, "path": ' + _AXIS_PATH + b"}"
+
 # ONVIF Analytics Service Specification, 5.5.3: pixels of 640 x 480, y up
 ONVIF_JSON = b"""{"Frame": [{"@UtcTime": "2021-10-05T15:13:27.321", "@Source": "MyClassifier",
  "@context": {"acme": "http://www.acme.com/schema"},
@@ -49,6 +72,21 @@ DEEPSTREAM = b"""{"version": "4.0", "id": "1252", "@timestamp": "2026-11-20T08:0
  "sensorId": "yard-1", "objects": ["7|480|540|576|810|Person|#|male|adult|#|0.9",
   "18446744073709551615|0|0|10|10|Vehicle"]}"""
 
+# The same, full schema (`msg-conv-payload-type=0`): an object a message
+DEEPSTREAM_FULL = b"""{"messageid": "a0e2a0a7", "mdsversion": "1.0",
+ "@timestamp": "2026-11-20T08:00:00.250Z",
+ "place": {"id": "1", "name": "XYZ", "type": "garage",
+  "location": {"lat": 30.32, "lon": -40.55, "alt": 100.0}},
+ "sensor": {"id": "yard-1", "type": "Camera", "description": "Entrance",
+  "location": {"lat": 45.29, "lon": -75.83, "alt": 48.15},
+  "coordinate": {"x": 5.2, "y": 10.1, "z": 11.2}},
+ "analyticsModule": {"id": "XYZ", "source": "resnet", "version": "1.0"},
+ "object": {"id": "7", "speed": 0.0, "direction": 0.0, "orientation": 0.0,
+  "person": {"age": 45, "gender": "male", "confidence": 0.9},
+  "bbox": {"topleftx": 480, "toplefty": 540, "bottomrightx": 576, "bottomrighty": 810},
+  "location": {"lat": 0.0, "lon": 0.0, "alt": 0.0}, "coordinate": {"x": 0.0, "y": 0.0, "z": 0.0}},
+ "event": {"id": "b0e2", "type": "moving"}, "videoPath": ""}"""
+
 # A plain topic's: docs/guides/mqtt.md
 FRAME = b"""{"time_s": 1795161600.25, "size": [1920, 1080], "ended": ["3"],
  "detections": [{"id": 7, "box": [480, 540, 576, 810], "class": "person"}]}"""
@@ -83,13 +121,18 @@ _HD = (1920.0, 1080.0)
 _FRAMES = Clock("frame_number", rate_hz=20.0, started_at_s=1_795_161_600.0)
 T = 1_795_161_600.25
 READERS = {
-    "axis": (AXIS, lambda message: axis.read_frame(message, {1: "yard"})),
+    "axis": (AXIS, lambda message: axis.read_message(message, {1: "yard"})),
+    "axis_beta": (AXIS_BETA, lambda message: axis.read_message(message, {1: "yard"})),
     "onvif_json": (
         ONVIF_JSON,
         lambda message: onvif.read_json(message, "yard", Profile.TRANSFORMED),
     ),
     "onvif_xml": (ONVIF_XML, lambda message: onvif.read_xml(message, "yard", Profile.TRANSFORMED)),
-    "deepstream": (DEEPSTREAM, lambda m: deepstream.read_frame(m, {"yard-1": "yard"}.get, _HD)),
+    "deepstream": (DEEPSTREAM, lambda m: deepstream.read_message(m, {"yard-1": "yard"}.get, _HD)),
+    "deepstream_full": (
+        DEEPSTREAM_FULL,
+        lambda m: deepstream.read_message(m, {"yard-1": "yard"}.get, _HD),
+    ),
     "frames": (FRAME, lambda message: frames.read_frame(message, "yard")),
     "supervision_csv": (
         SUPERVISION_CSV,
@@ -116,12 +159,19 @@ def _frigate(message):
 
 
 def _frigate_stored(answer):
-    found = (frigate.track_of(each, str) for each in frigate.read_stored(answer))
+    events = (each for each in frigate.read_stored(answer) if isinstance(each, frigate.Stored))
+    found = (frigate.track_of(each, str) for each in events)
     return [each for each in found if each is not None]
+
+
+def _axis(message):
+    return axis.read_message(message, {1: "yard"})
 
 
 # Whole tracks rather than boxes.
 TRACK_READERS = {
     "frigate": (FRIGATE, _frigate),
     "frigate_stored": (FRIGATE_STORED, _frigate_stored),
+    "axis_consolidated": (AXIS_CONSOLIDATED, _axis),
+    "axis_object_track": (AXIS_OBJECT_TRACK, _axis),
 }

@@ -11,15 +11,13 @@ from hypothesis import strategies as st
 from surefoot.bridge import inbox as inbox_module
 from surefoot.bridge import posting
 from surefoot.bridge import spool as spool_module
-from surefoot.bridge.feeds import Topics, read_feeds
+from surefoot.bridge.feeds import read_feeds
 from surefoot.bridge.inbox import Inbox
-from surefoot.bridge.inward import Inward
-from surefoot.bridge.posting import Posting
 from surefoot.bridge.service import LaterError
 from surefoot.bridge.spool import Part, Spool, SpoolError
+from tests.surefoot.bridge.halves import inward, posting_of
 
 T0 = 1_795_161_600.0
-TOPICS = Topics(prefix="surefoot", frigate=None, cameras={})
 MIB = 2**20
 
 
@@ -40,7 +38,7 @@ class Bridge:
     def start(self, now_s):
         self.spool = Spool(self.path, MIB)
         self.inbox = Inbox(self.unacknowledged.pop)
-        self.inward = Inward(inbox=self.inbox, topics=TOPICS, spool=self.spool)
+        self.inward = inward(self.inbox, self.spool)
         self.inward._begin(now_s)
         for number, message in self.unacknowledged.items():  # sent again
             self.inbox.add("surefoot/yard/frames", message, number, 1)
@@ -108,10 +106,9 @@ def test_a_full_spool_acknowledges_nothing_and_says_so(tmp_path, caplog):
     spool.keep(0.0, None, [Part("yard", b"", b"x" * 20)])
     inbox, stopping = Inbox(pytest.fail), threading.Event()
     inbox.add("surefoot/yard/tracks", b"{}", 1, 1)
-    inward = Inward(inbox=inbox, topics=TOPICS, spool=spool)
     threading.Timer(0.7, stopping.set).start()
     with caplog.at_level(logging.ERROR):
-        inward.carry(stopping)
+        inward(inbox, spool).carry(stopping)
     assert [record.message for record in caplog.records] == ["bridge_full"]
     spool.close()
 
@@ -126,8 +123,9 @@ class Tripping:
         self.posts += 1
         if self.trips and self.word in body:
             raise LaterError("500 internal", away=False)
-        self.stored += [(camera_id, each["id"]) for each in json.loads(body)["tracks"]]
-        return {"rejected": []}
+        tracks = json.loads(body)["tracks"]
+        self.stored += [(camera_id, each["id"]) for each in tracks]
+        return {"accepted": len(tracks), "rejected": []}
 
 
 def test_a_track_that_the_service_trips_over_waits_alone_and_is_not_lost(
@@ -139,7 +137,7 @@ def test_a_track_that_the_service_trips_over_waits_alone_and_is_not_lost(
     for name in [*(f"good{n}" for n in range(1000)), "bad"]:
         part = Part(f"cam{len(name) % 2}", head, json.dumps({"id": name}).encode())
         spool.keep(0.0, None, [part])
-    stopping, post = threading.Event(), Posting(spool=spool, service=service)
+    stopping, post = threading.Event(), posting_of(spool, service)
     monkeypatch.setattr(spool, "wait", lambda _: stopping.wait(0.01))
     thread = threading.Thread(target=post.run, args=(stopping,))
     thread.start()
@@ -161,7 +159,7 @@ def test_a_service_that_trips_over_everything_is_left_alone_longer_and_longer(
     spool, service = Spool(tmp_path / "bridge.sqlite", MIB), Tripping(b"")
     for n in range(50):
         spool.keep(0.0, None, [Part("yard", b"", b"{}%d" % n)])
-    post = Posting(spool=spool, service=service)
+    post = posting_of(spool, service)
     assert post._post_all(threading.Event()) == 0.0
     assert (service.posts, spool.waiting, len(post._held)) == (4, 50, 3)
     spool.close()

@@ -18,6 +18,7 @@ from tests.surefoot.bridge.stand import (
     needs_mosquitto,
     paths_of,
 )
+from tests.surefoot.bridge.test_adapters import NESTED
 
 PASSWD = shutil.which("mosquitto_passwd")
 pytestmark = [pytest.mark.slow, needs_mosquitto]
@@ -57,7 +58,8 @@ def test_posts_and_frigates_paths_come_in(tmp_path, port, corner):
         for kind in ("new", "update", "end", "end"):
             client.publish("frigate/events", frigate_event(kind, "17.5-a", "Front", PATH), qos=0)
         wait_for(lambda: stored(service) == {"own": 2, "frigate": 1})
-        # Refused for good, each with its reason, and none of them stops what comes after.
+        # Rejected for good, each with its reason, and none of them stops what comes after.
+        client.publish("frigate/events", NESTED)
         client.publish("frigate/events", b"no JSON")
         client.publish("surefoot/Not..An-Id/tracks", body)
         client.publish("surefoot/nobody/tracks", body)
@@ -66,10 +68,14 @@ def test_posts_and_frigates_paths_come_in(tmp_path, port, corner):
         client.publish("frigate/events", frigate_event("end", "3", "Front", PATH[:3]))
         client.publish("frigate/events", frigate_event("end", "4", "Front", PATH))
         wait_for(lambda: stored(service) == {"own": 2, "frigate": 2})
-        log = wait_for(lambda: (text := bridge.log.read_text()).count("refused") >= 5 and text)
-        assert log.count("not_found") == 2
-        assert "too_short" in log
+        log = wait_for(lambda: "too_short" in (text := bridge.log.read_text()) and text)
+        assert log.count("messages_rejected") == 3
+        assert log.count("camera_unknown") == 1
+        assert "not_found" not in log
+        assert log.count("tracks_refused") == 1
+        assert service.http.get("/readyz").json()["bridge_silent_s"] < 30
         assert bridge.stop() == 0
+    assert service.http.get("/readyz").json()["bridge_silent_s"] is None
     # All were acknowledged: none of them comes again.
     with bridged(tmp_path, port, service.url) as bridge:
         bridge.wait_connected(2)

@@ -5,10 +5,9 @@ import threading
 from surefoot.bridge.backlog import Backlog
 from surefoot.bridge.feeds import Topics
 from surefoot.bridge.inbox import Inbox
-from surefoot.bridge.inward import Inward
-from surefoot.bridge.posting import Posting
 from surefoot.bridge.service import LaterError
 from surefoot.bridge.spool import Part, Spool
+from tests.surefoot.bridge.halves import inward, posting_of
 
 
 def test_what_waits_is_told_once_a_minute_and_that_it_ended(caplog):
@@ -34,7 +33,7 @@ class Broken:
 def test_many_bodies_that_fail_are_one_line(tmp_path, caplog):
     spool = Spool(tmp_path / "bridge.sqlite", 2**20)
     spool.keep(0.0, None, [Part(f"cam{n}", b"", b"{}") for n in range(50)])
-    Posting(spool=spool, service=Broken())._post_all(threading.Event())
+    posting_of(spool, Broken())._post_all(threading.Event())
     (told,) = (each for each in caplog.records if each.message == "tracks_wait")
     assert (told.camera_id, told.reason, told.waiting) == ("cam0", "500 internal cam0", 50)
     spool.close()
@@ -48,9 +47,9 @@ def test_a_message_that_is_refused_in_each_frame_is_told_once(tmp_path, caplog):
     topics = Topics(prefix="surefoot", frigate=None, cameras={})
     timer = threading.Timer(1.5, stopping.set)
     timer.start()
-    Inward(inbox=inbox, topics=topics, spool=spool).carry(stopping)
+    inward(inbox, spool, topics=topics).carry(stopping)
     assert len(acknowledged) == 40
-    told = [each.topic for each in caplog.records if each.message == "mqtt_message_refused"]
+    told = [each.topic for each in caplog.records if each.message == "messages_rejected"]
     assert sorted(told) == ["surefoot/cam0/frames", "surefoot/cam1/frames"]
     spool.close()
 
