@@ -269,7 +269,7 @@ def _other_sources(v: _Values) -> str:
     )
 
 
-def _left_out(v: _Values) -> str:
+def _tracks_skipped(v: _Values) -> str:
     names = ", ".join(repr(name) for name in v["track_ids"])
     if v["tracks"] > len(v["track_ids"]):
         names += _(" and others")
@@ -393,7 +393,7 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         waits=v["waits_s"] / 60,
         limit=v["limit_s"] / 60,
     ),
-    ServiceCode.TRACKS_LEFT_OUT: _left_out,
+    ServiceCode.TRACKS_SKIPPED: _tracks_skipped,
     ServiceCode.DISABLED_BY_PERSON: N_("disabled by a person"),
     ServiceCode.ENDPOINT_GONE: N_("it answered 410: it is gone for good"),
     ServiceCode.ENDPOINT_FAILS: N_("it failed for more than {patience_s_in_h:g} h: {error}"),

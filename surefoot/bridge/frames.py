@@ -5,25 +5,28 @@ from surefoot.bridge.values import (
     Detection,
     Ended,
     MessageError,
+    confidence_of,
+    label_of,
     listed,
     number,
     parsed_json,
+    seconds,
     table,
     text,
 )
 
 
 def read_frame(message: bytes, camera: str) -> list[Detection | Ended]:
-    """The detections `{"id", "box": [x1, y1, x2, y2], "class"}` of a frame, and ids that ended.
+    """Return the detections `{"id", "box", "class"?, "confidence"?}` of a frame and ended ids.
 
-    Boxes are pixels of `size` [width, height], shares where `normalised` is true, else pixels of
-    the camera's own picture.
+    A box is [x1, y1, x2, y2] in pixels of `size` [width, height], in shares if `normalised` is
+    true, else in pixels of the camera's image. A class is a name or a COCO number.
 
     Raises:
         MessageError: it is no such frame.
     """
     frame = table(parsed_json(message), "frame")
-    time_s = number(frame.get("time_s"), "time_s")
+    time_s = seconds(frame.get("time_s"), "time_s")
     size: tuple[float, float] | None = None
     if frame.get("normalised") is True:
         size = NORMALISED
@@ -35,9 +38,10 @@ def read_frame(message: bytes, camera: str) -> list[Detection | Ended]:
         where = f"detections/{at}"
         seen = table(each, where)
         track_id = text(seen.get("id"), f"{where}/id")
-        label = None if seen.get("class") is None else text(seen["class"], f"{where}/class")
+        label = label_of(seen.get("class"), f"{where}/class")
         x1, y1, x2, y2 = _numbers(seen.get("box"), 4, f"{where}/box")
-        found.append(Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size))
+        ignored = confidence_of(seen.get("confidence"))
+        found.append(Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size, ignored))
     for at, each in enumerate(listed(frame.get("ended"), "ended")):
         found.append(Ended(camera, text(each, f"ended/{at}")))
     return found

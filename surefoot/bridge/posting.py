@@ -27,6 +27,8 @@ class Posting:
     service: Service
     _backlog: Backlog = field(default_factory=Backlog)
     _held: dict[int, tuple[float, float]] = field(default_factory=dict)  # again at, then after, s
+    skipped: Counter[str] = field(default_factory=Counter)  # tracks by reason, since the start
+    _logged: set[tuple[str, str]] = field(default_factory=set)
 
     def run(self, stopping: threading.Event) -> None:
         """Post what the spool has until the event is set."""
@@ -73,11 +75,25 @@ class Posting:
         try:
             receipt = self.service.post_tracks(group.camera, body)
             _tell_rejected(group.camera, receipt["rejected"])
+            self._note_skipped(group.camera, receipt)
         except RefusedError as error:
             _tell_refused(group, error)
         self.spool.drop(group)
         for number in group.tracks:
             self._held.pop(number, None)
+
+    def _note_skipped(self, camera: str, receipt: dict[str, Any]) -> None:
+        """Count the tracks that the service skipped; log a reason once for each camera."""
+        skipped = receipt.get("skipped", {})
+        self.skipped.update(skipped)
+        for reason, tracks in skipped.items():
+            if (camera, reason) in self._logged:
+                continue
+            if len(self._logged) >= MOST_HELD:
+                self._logged.clear()
+            self._logged.add((camera, reason))
+            extra = {"camera_id": camera, "reason": reason, "tracks": tracks}
+            log.info("posted_tracks_skipped", extra=extra)
 
     def _hold(self, group: Group, now_s: float) -> None:
         for number in group.tracks:

@@ -12,6 +12,8 @@ from surefoot.bridge.values import (
     Detection,
     MessageError,
     check_size,
+    confidence_of,
+    label_of,
     listed,
     number,
     parsed_json,
@@ -20,7 +22,6 @@ from surefoot.bridge.values import (
 )
 
 MAX_FILE_BYTES = 16 * 1024 * 1024  # 80,000 rows or so; JSON is built as a whole
-_COCO_PERSON = 0
 
 
 class Clock(NamedTuple):
@@ -83,12 +84,14 @@ def read_ultralytics_text(lines: bytes, camera: str, time_s: float) -> list[Dete
         if not 5 <= len(cells) <= 7:
             needed = "class xc yc w h [conf] id is needed"
             raise MessageError("malformed", f"line {at}: {needed}, got {line!r:.80}")
-        kind, x, y, width, height = (number(cell, f"line {at}") for cell in cells[:5])
+        x, y, width, height = (number(cell, f"line {at}") for cell in cells[1:5])
         if len(cells) == 5 or not cells[-1].isdecimal():
             continue
         box = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
         track_id = text(cells[-1], f"line {at}")
-        found.append(Detection(camera, time_s, track_id, _label(kind), box, NORMALISED))
+        label = label_of(cells[0], f"line {at}")
+        ignored = confidence_of(cells[5]) if len(cells) == 7 else None
+        found.append(Detection(camera, time_s, track_id, label, box, NORMALISED, ignored))
     return found
 
 
@@ -108,8 +111,9 @@ def read_ultralytics_summary(
         edges = table(row.get("box"), f"{at}/box")
         names = ("x1", "y1", "x2", "y2")
         x1, y1, x2, y2 = (number(edges.get(name), f"{at}/box/{name}") for name in names)
-        label, track_id = text(row.get("name"), f"{at}/name"), text(row["track_id"], f"{at}")
-        found.append(Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size))
+        label, track_id = label_of(row.get("name"), f"{at}/name"), text(row["track_id"], f"{at}")
+        ignored, box = confidence_of(row.get("confidence")), (x1, y1, x2, y2)
+        found.append(Detection(camera, time_s, track_id, label, box, size, ignored))
     return found
 
 
@@ -126,18 +130,15 @@ def _supervision(
         when = number(row.get(clock.column), f"{at}/{clock.column}")
         names = ("x_min", "y_min", "x_max", "y_max")
         x1, y1, x2, y2 = (number(row.get(name), f"{at}/{name}") for name in names)
-        named, kind = row.get("class_name"), row.get("class_id")
-        label = None if kind in (None, "") else _label(number(kind, f"{at}/class_id"))
+        label = label_of(row.get("class_name"), f"{at}/class_name")
+        if label is None:
+            label = label_of(row.get("class_id"), f"{at}/class_id")
         yield Detection(
             camera=camera,
             time_s=clock.started_at_s + when / clock.rate_hz,
             track_id=text(track_id, f"{at}/tracker_id"),
-            label=text(named, f"{at}/class_name") if named else label,
+            label=label,
             box=(x1, y1, x2, y2),
             size=size,
+            confidence=confidence_of(row.get("confidence")),
         )
-
-
-def _label(kind: float) -> str:
-    """A class by its number, as models that were trained on COCO have them."""
-    return "person" if kind == _COCO_PERSON else f"class {kind:g}"
