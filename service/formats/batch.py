@@ -1,7 +1,6 @@
 """Requests that carry tracks as JSON and NDJSON, and what all forms have in common."""
 
 import json
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -32,11 +31,11 @@ from service.formats.track import (
     is_text,
 )
 from surefoot.people import SkipReason
+from surefoot.times import restore_plus
 from surefoot.track_rules import TrackRejectedError, refuse
 
 DEFAULT_SOURCE = "unnamed"
 _FAR_S = 1e12
-_LOST_PLUS = re.compile(r"(T\d\d[:\d.]*) (\d\d:?\d\d)$")
 MOST_IGNORED = 20  # names of unknown fields in an answer
 MOST_CLASSES = 12  # classes in a message
 MAX_CPU_S = 10.0  # of reading one body: the largest honest ones take one or two
@@ -157,8 +156,6 @@ def read_rate(value: Any) -> float:
 def read_time(value: Any) -> float:
     """Return seconds since the epoch of an RFC 3339 time with a zone, or of such a number.
 
-    A `+` that is not encoded arrives as a blank in a query: before a zone it can be nothing else.
-
     Raises:
         MalformedError: the value is neither.
     """
@@ -166,7 +163,7 @@ def read_time(value: Any) -> float:
     if isinstance(value, str):
         needed = "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z"
         try:
-            moment = datetime.fromisoformat(_LOST_PLUS.sub(r"\1+\2", value))
+            moment = datetime.fromisoformat(restore_plus(value))
         except ValueError as error:
             hint = "; encode + as %2B in a query" if " " in value else ""
             raise wrong(f"{needed}{hint}; got {value!r:.40}") from error

@@ -22,7 +22,8 @@ class Head:
 
     `separator` is None for runs of blanks. A line has `cells`, the last of which is empty where
     lines end with a separator, and `count` columns. The header is line `header_no`, 0 if there is
-    none. `texts` tells which columns are text; `sample` (N, count) are the first lines' numbers.
+    none. `texts` tells which columns are mostly text, `some_text` which have any text; `sample`
+    (N, count) are the first lines' numbers.
     """
 
     separator: str | None
@@ -32,6 +33,7 @@ class Head:
     cells: int
     count: int
     texts: tuple[bool, ...]
+    some_text: tuple[bool, ...]
     sample: Array
 
     @property
@@ -70,12 +72,13 @@ def read_head(body: bytes) -> Head:
     data = [cells for _, cells in rows if not cells[0].startswith("#")]
     cells = Counter(map(len, data)).most_common(1)[0][0] if data else len(header or ())
     data = [row for row in data if len(row) == cells]
-    ended = separator is not None and data and all(row[-1] == "" for row in data)
+    named = header is not None and len(header) >= cells and header[-1] != ""
+    ended = separator and data and not named and all(row[-1] == "" for row in data)
     count = cells - 1 if ended else cells
     decimal_comma = separator in (";", "\t") and any("," in cell for row in data for cell in row)
     if decimal_comma:
         data = [[cell.replace(",", ".") for cell in row] for row in data]
-    texts = tuple(_is_text([row[at] for row in data]) for at in range(count))
+    shares = [_text_share([row[at] for row in data]) for at in range(count)]
     sample = np.array(
         [[_number(row[at]) for at in range(count)] for row in data], dtype=np.float64
     ).reshape(len(data), count)
@@ -86,7 +89,8 @@ def read_head(body: bytes) -> Head:
         header_no=header_no,
         cells=cells,
         count=count,
-        texts=texts,
+        texts=tuple(share > 0.5 for share in shares),
+        some_text=tuple(share > 0 for share in shares),
         sample=sample,
     )
 
@@ -114,9 +118,10 @@ def _is_header(cells: Sequence[str]) -> bool:
     return len(cells) >= _FEWEST_CELLS or any(role_of(cell.lstrip("# ")) for cell in cells)
 
 
-def _is_text(cells: Sequence[str]) -> bool:
+def _text_share(cells: Sequence[str]) -> float:
+    """Return the share of cells that are no number, of those that have a value."""
     known = [cell for cell in cells if not is_missing(cell)]
-    return sum(map(_is_number, known)) * 2 < len(known)
+    return 1 - sum(map(_is_number, known)) / len(known) if known else 0.0
 
 
 def _is_number(cell: str) -> bool:

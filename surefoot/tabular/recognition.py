@@ -83,7 +83,7 @@ def plan_of(head: Head, layout: Layout | None, shifted: int) -> Plan:
         )
     assert layout is not None
     class_at = layout.at("class", head.count)
-    text_at = class_at if class_at is not None and head.texts[class_at] else None
+    text_at = class_at if class_at is not None and head.some_text[class_at] else None
     used = {
         at: role
         for at, role in enumerate(layout.columns[: head.count])

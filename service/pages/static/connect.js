@@ -115,7 +115,7 @@ async function post(file) {
   const answer = await call("POST", addressOf(type), file, headers);
   const { accepted, duplicates, rejected, skipped = {} } = answer;
   const counts = { taken: accepted, known: duplicates, refused: rejected.length };
-  const parts = [_("{taken} accepted, {known} known before, {refused} rejected", counts)];
+  const parts = [_("{taken} taken, {known} known before, {refused} refused", counts)];
   for (const [reason, n] of Object.entries(skipped)) parts.push(SKIPPED[reason]?.(n) ?? `${n} ${reason}`);
   says.textContent = `${file.name}: ${parts.join(", ")}.`;
 }
