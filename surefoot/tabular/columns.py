@@ -56,6 +56,8 @@ def roles_of(names: Iterable[str]) -> tuple[str, ...]:
     """Return the meaning of each column of a header, `UNUSED` for an unknown name."""
     lowered = [name.strip().lower() for name in names]
     roles = [role_of(name) or UNUSED for name in lowered]
+    if "l" in lowered:  # beside it, t is the top, not the time
+        roles = ["top" if name == "t" else role for name, role in zip(lowered, roles, strict=True)]
     # Names that count from 0: x1, y1 is then the lower right corner.
     if {"x0", "y0", "x1", "y1"} <= {_PREFIX.sub("", name) for name in lowered}:
         later = {"x1": "right", "y1": "bottom"}

@@ -65,10 +65,6 @@ class Facts:
         """True if most values of a column have a fraction."""
         return self._share(at, self._whole(at)) < 0.5
 
-    def beyond_classes(self, at: int) -> bool:
-        """True if most values of a column are larger than any class number."""
-        return self._share(at, np.abs(self.values[:, at]) > _LARGEST_CLASS) > 0.5
-
     def constant(self, at: int) -> bool:
         """True if a column of several lines has one value."""
         return len(self.values) > 1 and self.all(at, self.values[0, at])
@@ -93,15 +89,22 @@ class Facts:
     @property
     def class_in_seventh(self) -> bool:
         """True if column 7 is whole numbers, not only -1, 0, 1, and one value for each track."""
-        column = self.values[:, 6]
         if not self.whole_within(6, -1, _LARGEST_COCO) or self.whole_within(6, -1, 1):
             return False
-        low = np.full(int(self.tracks.max()) + 1, np.inf)
-        high = -low
+        return self.constant_by_track(6) >= _MOST
+
+    def constant_by_track(self, at: int) -> float:
+        """Share of tracks in which a column has one value, as a class has."""
+        column = self.values[:, at]
         known = np.isfinite(column)
-        np.minimum.at(low, self.tracks[known], column[known])
-        np.maximum.at(high, self.tracks[known], column[known])
-        return bool((low == high)[np.unique(self.tracks[known])].mean() >= _MOST)
+        tracks, values = self.tracks[known], column[known]
+        if not tracks.size:
+            return 0.0
+        low = np.full(int(tracks.max()) + 1, np.inf)
+        high = -low
+        np.minimum.at(low, tracks, values)
+        np.maximum.at(high, tracks, values)
+        return float((low == high)[np.unique(tracks)].mean())
 
     def seen(self, at: int) -> str:
         """Return the values of a column, the first dozen of them."""

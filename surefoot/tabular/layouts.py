@@ -55,8 +55,9 @@ def _mot(facts: Facts) -> bool:
         return True
     if facts.count != 10:
         return False
-    # Columns 8 to 10 may be a place in the world.
-    return facts.seldom_whole(7) or facts.beyond_classes(7) or all(map(facts.zero, (7, 8, 9)))
+    # Columns 8 to 10 may be a place in the world: it has fractions, or moves.
+    moves = not facts.all(8, -1) and facts.constant_by_track(7) < 0.5
+    return facts.seldom_whole(7) or moves or all(map(facts.zero, (7, 8, 9)))
 
 
 def _boxmot(facts: Facts) -> bool:

@@ -168,8 +168,8 @@ def _read_even(lines: Lines, block: list[str], head: Head, plan: Plan) -> bool:
 
 def _read_line(lines: Lines, line_no: int, line: str, head: Head, plan: Plan) -> None:
     cells = head.split(line) if len(line) <= MAX_LINE_CHARS else []
-    name = cells[plan.id_at][:MAX_ID_LENGTH] if len(cells) > plan.id_at else ""
-    name = name or f"line {line_no}"
+    has_id = len(cells) > plan.id_at
+    name = cells[plan.id_at][:MAX_ID_LENGTH] if has_id else f"line {line_no}"
     at = lines.names.setdefault(name, len(lines.names))
     if name in lines.broken and (len(lines) or line_no > _TRIED):
         return
