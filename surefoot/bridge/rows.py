@@ -13,13 +13,13 @@ from surefoot.bridge.values import (
     MessageError,
     check_size,
     confidence_of,
-    label_of,
     listed,
     number,
     parsed_json,
     table,
     text,
 )
+from surefoot.people import PEDESTRIANS
 
 MAX_FILE_BYTES = 16 * 1024 * 1024  # 80,000 rows or so; JSON is built as a whole
 
@@ -84,14 +84,13 @@ def read_ultralytics_text(lines: bytes, camera: str, time_s: float) -> list[Dete
         if not 5 <= len(cells) <= 7:
             needed = "class xc yc w h [conf] id is needed"
             raise MessageError("malformed", f"line {at}: {needed}, got {line!r:.80}")
-        x, y, width, height = (number(cell, f"line {at}") for cell in cells[1:5])
+        kind, x, y, width, height = (number(cell, f"line {at}") for cell in cells[:5])
         if len(cells) == 5 or not cells[-1].isdecimal():
             continue
         box = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
         track_id = text(cells[-1], f"line {at}")
-        label = label_of(cells[0], f"line {at}")
         ignored = confidence_of(cells[5]) if len(cells) == 7 else None
-        found.append(Detection(camera, time_s, track_id, label, box, NORMALISED, ignored))
+        found.append(Detection(camera, time_s, track_id, _label(kind), box, NORMALISED, ignored))
     return found
 
 
@@ -111,7 +110,7 @@ def read_ultralytics_summary(
         edges = table(row.get("box"), f"{at}/box")
         names = ("x1", "y1", "x2", "y2")
         x1, y1, x2, y2 = (number(edges.get(name), f"{at}/box/{name}") for name in names)
-        label, track_id = label_of(row.get("name"), f"{at}/name"), text(row["track_id"], f"{at}")
+        label, track_id = text(row.get("name"), f"{at}/name"), text(row["track_id"], f"{at}")
         ignored, box = confidence_of(row.get("confidence")), (x1, y1, x2, y2)
         found.append(Detection(camera, time_s, track_id, label, box, size, ignored))
     return found
@@ -130,15 +129,19 @@ def _supervision(
         when = number(row.get(clock.column), f"{at}/{clock.column}")
         names = ("x_min", "y_min", "x_max", "y_max")
         x1, y1, x2, y2 = (number(row.get(name), f"{at}/{name}") for name in names)
-        label = label_of(row.get("class_name"), f"{at}/class_name")
-        if label is None:
-            label = label_of(row.get("class_id"), f"{at}/class_id")
+        named, kind = row.get("class_name"), row.get("class_id")
+        label = None if kind in (None, "") else _label(number(kind, f"{at}/class_id"))
         yield Detection(
             camera=camera,
             time_s=clock.started_at_s + when / clock.rate_hz,
             track_id=text(track_id, f"{at}/tracker_id"),
-            label=label,
+            label=text(named, f"{at}/class_name") if named else label,
             box=(x1, y1, x2, y2),
             size=size,
             confidence=confidence_of(row.get("confidence")),
         )
+
+
+def _label(kind: float) -> str:
+    """Return the name of a class number, as models that were trained on COCO have them."""
+    return "person" if PEDESTRIANS.include(kind) else f"class {kind:g}"

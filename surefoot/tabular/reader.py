@@ -46,14 +46,16 @@ class TableTracks:
     """The tracks of a table, in the order of their first lines.
 
     `rows` are, for each track, time in s, u, v of the foot (N, 3) or time and box (N, 5), in the
-    order of time. A track in `broken` has a line that cannot be read. `skipped` counts whole
-    tracks that have no line to use; `other_classes` are the first classes that are no person.
+    order of time and in pixels that count from 0; the table's counted from `first_px`. A track in
+    `broken` has a line that cannot be read. `skipped` counts whole tracks that have no line to
+    use; `other_classes` are the first classes that are no person.
     """
 
     rows: dict[str, Array]
     broken: dict[str, str]
     skipped: Counter[SkipReason]
     other_classes: tuple[str, ...] = ()
+    first_px: int = 0
 
 
 def read_table(body: bytes, options: Options) -> TableTracks:
@@ -181,6 +183,7 @@ def _tracks_of(
         broken=lines.broken,
         skipped=Counter({why: int(which.sum()) for why, which in reasons.items() if which.any()}),
         other_classes=others,
+        first_px=0 if options.normalised else layout.first,
     )
 
 
