@@ -125,7 +125,7 @@ class Client:
         self._spool_bytes = int(spool_mb * 1e6)
         self._number = max((_number_of(path) for path in self._files()), default=0)
         self._open: dict[str, list[list[float]]] = {}  # rows of time and box
-        self._labels: dict[str, Counter[str]] = {}
+        self._labels: dict[str, Counter[str | None]] = {}
         self._heard_s: dict[str, float] = {}
         self._done: list[dict[str, Any]] = []
         self._lock = threading.Lock()
@@ -176,8 +176,8 @@ class Client:
             if rows and (full or at_s - rows[-1][0] > self._silence_s):
                 self._finish(name)
             self._open.setdefault(name, []).append(row)
-            if label is not None:
-                self._labels.setdefault(name, Counter())[str(label)] += 1
+            kind = None if label is None else str(label)
+            self._labels.setdefault(name, Counter())[kind] += 1
             self._heard_s[name] = time.monotonic()
 
     def end(self, track_id: object) -> None:
@@ -210,11 +210,12 @@ class Client:
     def _finish(self, name: str) -> None:
         rows = self._open.pop(name, None)
         self._heard_s.pop(name, None)
-        labels = self._labels.pop(name, None)
+        labels = self._labels.pop(name, Counter())
         if rows:
             track: dict[str, Any] = {"id": name, "boxes": rows}
-            if labels:
-                track["class"] = labels.most_common(1)[0][0]
+            label = labels.most_common(1)[0][0]
+            if label is not None:
+                track["class"] = label
             self._done.append(track)
 
     def _run(self) -> None:

@@ -10,13 +10,16 @@ _MOST = 0.98  # of the values of a column: a few wrong cells do not change its m
 _LARGEST_CLASS = 1_000
 _LARGEST_COCO = 90
 _MOST_NAMED = 12
+_SAMPLE = 20_000  # lines in which ids and frames are compared
+_FAR = 0.3  # of a box's height: nobody walks so far from one frame to the next
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
     """Values (N, columns) of a table of `count` columns; NaN where a cell is no number.
 
-    Columns are indices from 0. `tracks` (N,) is the number of each line's track.
+    Columns are indices from 0, in the usual order: frame, id, left, top, width, height. `tracks`
+    (N,) is the number of each line's track.
     """
 
     values: Array
@@ -106,9 +109,29 @@ class Facts:
         np.maximum.at(high, tracks, values)
         return float((low == high)[np.unique(tracks)].mean())
 
+    @property
+    def swapped(self) -> bool:
+        """True if boxes move like people only with column 1 as the id and column 2 as the frame."""
+        values = self.values[:_SAMPLE]
+        if len(values) < 10 or not self.whole_and_varies(1):
+            return False
+        tall = float(np.nanmedian(values[:, 5]))
+        as_read, other = _step(values, 1, 0), _step(values, 0, 1)
+        return as_read > _FAR * tall and other < _FAR * tall and other < as_read / 4
+
     def seen(self, at: int) -> str:
         """Return the values of a column, the first dozen of them."""
         column = self.values[:, at]
         found = np.unique(column[np.isfinite(column)]).tolist()
         more = ", ..." if len(found) > _MOST_NAMED else ""
         return ", ".join(f"{value:g}" for value in found[:_MOST_NAMED]) + more
+
+
+def _step(values: Array, track_at: int, frame_at: int) -> float:
+    """Median way of the foot from one line of a track to the next; infinite without such lines."""
+    ordered = values[np.lexsort((values[:, frame_at], values[:, track_at]))]
+    same = np.diff(ordered[:, track_at]) == 0
+    if same.sum() < len(values) / 2:
+        return np.inf
+    u, v = ordered[:, 2] + ordered[:, 4] / 2, ordered[:, 3] + ordered[:, 5]
+    return float(np.nanmedian(np.hypot(np.diff(u), np.diff(v))[same]))

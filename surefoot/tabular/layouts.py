@@ -302,6 +302,12 @@ def by_content(facts: Facts, *, classes_given: bool) -> Layout:
         tail = "".join(f",{role}" for role in fitting[0].columns[6 : facts.count])
         corners = CORNERS.name if facts.count <= 7 else _CORNERS + tail
         readings.append(f"layout={corners} ({CORNERS.meaning})")
+    if facts.swapped and len(readings) == 1:
+        rest = "".join(f",{role}" for role in fitting[0].columns[2 : facts.count])
+        readings = [
+            f"layout=frame,id{rest} (column 1 is the frame)",
+            f"layout=id,frame{rest} (column 2 is the frame)",
+        ]
     if len(readings) > 1:
         raise LayoutError(
             "layout",

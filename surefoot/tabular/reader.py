@@ -19,7 +19,7 @@ from surefoot.tabular.layouts import (
     check_fit,
     in_usual_order,
 )
-from surefoot.tabular.lines import Bounds, Lines, Plan, check_lines, read_lines
+from surefoot.tabular.lines import Bounds, Lines, check_lines, read_lines
 from surefoot.tabular.recognition import known_layout, plan_of
 
 _MOST_NAMED = 12  # classes in a message
@@ -67,7 +67,8 @@ def read_table(body: bytes, options: Options) -> TableTracks:
     """
     check_lines(body, options.bounds)
     head = read_head(body)
-    if head.header is not None and not len(head.sample):
+    named = any(map(roles.role_of, head.header or ()))
+    if named and not len(head.sample):
         return TableTracks(rows={}, broken={}, skipped=Counter())
     layout, shifted = known_layout(head, options.layout)
     _check_clock(layout, options)
@@ -80,7 +81,10 @@ def read_table(body: bytes, options: Options) -> TableTracks:
         return TableTracks(rows={}, broken={}, skipped=Counter())
     names, tracks = _merged(lines)
     if head.header is None and in_usual_order(layout):
-        layout = _by_values(layout, head.count - shifted, lines, tracks, plan, options)
+        ids = np.array([_as_number(name) for name in names])[tracks]
+        values = np.insert(lines.numbers(len(plan.numbers)), 1, ids, axis=1)
+        facts = Facts(values=values, count=head.count - shifted, tracks=tracks)
+        layout = _by_values(layout, facts, options)
     assert layout is not None
     numbers = lines.numbers(len(plan.numbers))
     by_role = {
@@ -100,18 +104,8 @@ def _check_clock(layout: Layout | None, options: Options) -> None:
             raise LayoutError(name, "is needed, because the table has frame numbers, not times")
 
 
-def _by_values(
-    layout: Layout | None,
-    count: int,
-    lines: Lines,
-    tracks: Index,
-    plan: Plan,
-    options: Options,
-) -> Layout:
+def _by_values(layout: Layout | None, facts: Facts, options: Options) -> Layout:
     """Return the layout that fits the values of all lines, or check the one of the request."""
-    numbers = lines.numbers(len(plan.numbers))
-    values = np.insert(numbers, 1, np.nan, axis=1)  # the id is text, and no rule asks for it
-    facts = Facts(values=values, count=count, tracks=tracks)
     if layout is None:
         return by_content(facts, classes_given=options.classes is not None)
     check_fit(layout, facts)
@@ -142,6 +136,10 @@ def _plain_id(name: str) -> str:
     except ValueError:
         return name
     return f"{number:.0f}" if number.is_integer() and abs(number) < 2**53 else name
+
+
+def _as_number(name: str) -> float:
+    return float(name) if name.isascii() and name.isdecimal() else np.nan
 
 
 def _tracks_of(

@@ -49,3 +49,18 @@ def test_lines_of_json_have_classes_too(corner):
         headers={"Content-Type": "application/x-ndjson"},
     ).json()
     assert (answer["accepted"], answer["skipped"]) == (1, {"not_a_person": 1})
+
+
+def test_query_names_the_classes_of_people_for_json_too(corner):
+    tracks = [{**track(str(n)), "class": label} for n, label in enumerate((0, 3, "worker", "car"))]
+    answer = corner.post("/cameras/corner/tracks?classes=3,worker", json={"tracks": tracks}).json()
+    assert (answer["accepted"], answer["skipped"]) == (2, {"not_a_person": 2})
+
+
+def test_body_of_which_all_is_rejected_or_skipped_counts_both(corner):
+    short = {"id": "brief", "points": track("x")["points"][:2]}
+    document = post(corner, short, {**track("1"), "class": "car"}).json()
+    assert (document["status"], document["code"]) == (422, "nothing_taken")
+    assert document["detail"].startswith(
+        "tracks: none of 1 could be taken, 1 others were skipped, the first because: 2 points"
+    )

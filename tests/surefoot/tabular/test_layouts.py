@@ -182,6 +182,10 @@ UNCLEAR = {
     "an export of CVAT with many labels": (
         table(MOT + ",1,14,1", MOT + ",1,15,0"), {"classes=1": {"classes": "14"}}, 1, FOOT,
     ),
+    "the id before the frame": (
+        table("{i},{f},{l1},{t1},{w},{h},1", "{i},{f},{l1},{t1},{w},{h},1"),
+        {"column 2 is the frame": {"layout": "id,frame,left,top,width,height,conf"}}, 2, FOOT,
+    ),
     "class numbers from 1": (
         table(MOT + ",0.9,1", MOT + ",0.9,3"),
         {"classes=0 or classes=1": {"classes": "1"}}, 1, FOOT,
