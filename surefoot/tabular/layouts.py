@@ -4,15 +4,14 @@ A table without a header is compared with every layout of its number of columns.
 fit: if two fit, or none, the caller is asked (`?layout=`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from surefoot.people import PEDESTRIANS, PersonClasses
-from surefoot.tabular.columns import SIZE, UNUSED, form_of, role_of
 from surefoot.tabular.facts import Facts
 
-_SIZE = "frame,id,left,top,width,height"
-_CORNERS = "frame,id,left,top,right,bottom"
+SIZE_FIRST = "frame,id,left,top,width,height"
+CORNERS_FIRST = "frame,id,left,top,right,bottom"
 _GROUND_TRUTH = PersonClasses(numbers=frozenset((1, 7)))  # 7: a person who stands
 _VISDRONE = PersonClasses(numbers=frozenset((1, 2)))
 
@@ -105,14 +104,14 @@ def _columns(text: str) -> tuple[str, ...]:
 LAYOUTS = (
     Layout(
         name="mot",
-        columns=_columns(f"{_SIZE},conf,-,-,-"),
+        columns=_columns(f"{SIZE_FIRST},conf,-,-,-"),
         fewest=6,
         meaning="MOTChallenge results, without a class",
         fits=_mot,
     ),
     Layout(
         name="mot-gt",
-        columns=_columns(f"{_SIZE},conf,class,visibility"),
+        columns=_columns(f"{SIZE_FIRST},conf,class,visibility"),
         fewest=9,
         meaning="MOTChallenge ground truth: classes 1 and 7 are people, column 9 is the visibility",
         classes=_GROUND_TRUTH,
@@ -120,7 +119,7 @@ LAYOUTS = (
     ),
     Layout(
         name="cvat",
-        columns=_columns(f"{_SIZE},conf,class,visibility"),
+        columns=_columns(f"{SIZE_FIRST},conf,class,visibility"),
         fewest=9,
         meaning="a MOT export of CVAT: class numbers are the lines of its labels.txt, from 1",
         classes=None,
@@ -128,28 +127,28 @@ LAYOUTS = (
     ),
     Layout(
         name="boxmot",
-        columns=_columns(f"{_SIZE},conf,class,-"),
+        columns=_columns(f"{SIZE_FIRST},conf,class,-"),
         fewest=8,
         meaning="BoxMOT: column 7 is the confidence, class 0 is a person",
         fits=_boxmot,
     ),
     Layout(
         name="conf-last",
-        columns=_columns(f"{_SIZE},-,class,conf"),
+        columns=_columns(f"{SIZE_FIRST},-,class,conf"),
         fewest=9,
         meaning="column 9 is the confidence, class 0 is a person",
         fits=_conf_last,
     ),
     Layout(
         name="mcmot",
-        columns=_columns(f"{_SIZE},conf,class,-,-"),
+        columns=_columns(f"{SIZE_FIRST},conf,class,-,-"),
         fewest=10,
         meaning="MCMOT: class 0 is a person",
         fits=_mcmot,
     ),
     Layout(
         name="visdrone",
-        columns=_columns(f"{_SIZE},conf,class,truncation,occlusion"),
+        columns=_columns(f"{SIZE_FIRST},conf,class,truncation,occlusion"),
         fewest=10,
         meaning="VisDrone: classes 1 (pedestrian) and 2 (people) are people",
         classes=_VISDRONE,
@@ -157,7 +156,7 @@ LAYOUTS = (
     ),
     Layout(
         name="corners",
-        columns=_columns(f"{_CORNERS},conf,class"),
+        columns=_columns(f"{CORNERS_FIRST},conf,class"),
         fewest=6,
         first=0,
         meaning="columns 5 and 6 are the right and bottom edge",
@@ -165,7 +164,7 @@ LAYOUTS = (
     ),
     Layout(
         name="corners-size",
-        columns=_columns(f"{_CORNERS},-,-"),
+        columns=_columns(f"{CORNERS_FIRST},-,-"),
         fewest=8,
         first=0,
         meaning="left, top, right and bottom edge, then width and height",
@@ -200,170 +199,12 @@ LAYOUTS = (
         meaning="AI City Challenge: column 1 is the camera, column 3 the frame",
     ),
 )
-_BY_NAME = {layout.name: layout for layout in LAYOUTS}
-MOT, CORNERS = _BY_NAME["mot"], _BY_NAME["corners"]
+BY_NAME = {layout.name: layout for layout in LAYOUTS}
+MOT, CORNERS = BY_NAME["mot"], BY_NAME["corners"]
 # With frame, id and box first, so that the values of the other columns identify them.
-_IN_ORDER = tuple(layout for layout in LAYOUTS if layout.columns[:4] == MOT.columns[:4])
+IN_ORDER = tuple(layout for layout in LAYOUTS if layout.columns[:4] == MOT.columns[:4])
 
 
 def in_usual_order(layout: Layout | None) -> bool:
     """True for a known layout with frame, id and box first; its values identify it."""
-    return layout is None or layout in _IN_ORDER
-
-
-def read_layout(text: str) -> Layout:
-    """Return the layout of a name, or of a list of columns such as `frame,id,x1,y1,x2,y2`.
-
-    Raises:
-        LayoutError: the name or a column is unknown, or the columns do not make a track.
-    """
-    if text in _BY_NAME:
-        return _BY_NAME[text]
-    names = [name.strip() for name in text.split(",")]
-    if len(names) == 1:
-        known = ", ".join(_BY_NAME)
-        needed = f"one of {known}, or a list of columns such as {_CORNERS},conf"
-        raise LayoutError("layout", f"must be {needed}; got {text!r:.80}")
-    columns = tuple(UNUSED if name in ("-", "_") else role_of(name) for name in names[:100])
-    if None in columns:
-        wrong = names[columns.index(None)]
-        raise LayoutError("layout", f"unknown column {wrong!r:.40}; use - for an unused column")
-    return of_columns(tuple("class" if c == "class_name" else str(c) for c in columns), "layout")
-
-
-def of_columns(columns: tuple[str, ...], where: str) -> Layout:
-    """Return the layout of a list of columns; `where` names it in an error.
-
-    Raises:
-        LayoutError: a column is missing or comes twice.
-    """
-    used = [role for role in columns if role != UNUSED]
-    twice = next((role for role in used if used.count(role) > 1), None)
-    if twice is not None:
-        raise LayoutError("layout", f"{where}: column {twice} comes twice; use - for one of them")
-    form = form_of(columns)
-    missing = [] if "id" in columns else ["id"]
-    if not {"frame", "time_s", "time_ms"} & set(columns):
-        missing.append("frame or time_s")
-    if form is None:
-        missing.append("left,top,width,height or x1,y1,x2,y2 or u_px,v_px")
-    if missing:
-        got = ",".join(columns)
-        raise LayoutError("layout", f"{where}: missing {' and '.join(missing)}; got {got:.200}")
-    return Layout(
-        name=",".join(columns),
-        columns=columns,
-        fewest=len(columns),
-        meaning="columns as listed",
-        first=1 if form == SIZE else 0,
-    )
-
-
-def by_head(texts: Sequence[bool], facts: Facts) -> Layout | None:
-    """Return the layout with another order of columns than MOTChallenge's, None if none fits.
-
-    `texts` tells which columns are text; `facts` are those of the first lines.
-    """
-    count, found = len(texts), None
-    if count in (17, 18) and texts[2] and not any(texts[3:]):
-        found = "kitti"
-    elif count >= 10 and texts[9] and not any(texts[:9]):
-        found = "sdd"
-    elif count == 12 and not any(texts) and facts.flags(2) and facts.flags(3):
-        found = "towncentre"
-    elif count == 9 and not any(texts) and facts.constant(0):
-        found = "aicity" if facts.whole_and_varies(2) and facts.seldom_whole(7) else None
-    return None if found is None else _BY_NAME[found]
-
-
-def by_content(facts: Facts, *, classes_given: bool) -> Layout:
-    """Return the only layout that fits a table without a header.
-
-    `classes_given`: the request names the classes of people, so there is a class column, and
-    layouts that differ in class numbers only are the same.
-
-    Raises:
-        LayoutError: none fits, or several do.
-    """
-    fitting = [each for each in _IN_ORDER if each is not CORNERS and each.fits(facts)]
-    with_class = [layout for layout in fitting if "class" in layout.columns]
-    if classes_given and with_class:
-        fitting = with_class[:1]
-    if not fitting:
-        raise _unknown(facts)
-    readings = [f"layout={layout.name} ({layout.meaning})" for layout in fitting]
-    if facts.count in (7, 10) and facts.class_in_seventh and fitting == [MOT]:
-        rest = ",-" * (facts.count - 7)
-        readings = [
-            f"layout={_SIZE},conf{rest} (column 7 is the confidence)",
-            f"layout={_SIZE},class{rest} (column 7 is the class)",
-        ]
-    if facts.corners >= 0.9 and len(fitting) == 1 and fitting[0].columns[4] == "width":
-        tail = "".join(f",{role}" for role in fitting[0].columns[6 : facts.count])
-        corners = CORNERS.name if facts.count <= 7 else _CORNERS + tail
-        readings.append(f"layout={corners} ({CORNERS.meaning})")
-    if facts.swapped and len(readings) == 1:
-        rest = "".join(f",{role}" for role in fitting[0].columns[2 : facts.count])
-        readings = [
-            f"layout=frame,id{rest} (column 1 is the frame)",
-            f"layout=id,frame{rest} (column 2 is the frame)",
-        ]
-    if len(readings) > 1:
-        raise LayoutError(
-            "layout",
-            f"the {facts.count} columns can be read in {len(readings)} ways: "
-            f"{'; or '.join(readings)}. Name one in the query",
-        )
-    if fitting[0].classes is None and not classes_given:
-        raise ask_classes(fitting[0], facts)
-    return fitting[0]
-
-
-def check_fit(layout: Layout, facts: Facts) -> None:
-    """Check that the values of a table fit the layout that the request names.
-
-    Raises:
-        LayoutError: they do not.
-    """
-    check_count(layout, facts.count)
-    if not layout.fits(facts):
-        raise LayoutError(
-            "layout",
-            f"{layout.name} ({layout.meaning}) does not fit the values of the table; "
-            f"list its columns instead, for example layout={_SIZE},conf",
-        )
-
-
-def check_count(layout: Layout, count: int) -> None:
-    """Check that a table has as many columns as the layout that the request names.
-
-    Raises:
-        LayoutError: it has not.
-    """
-    most = max(len(layout.columns), layout.fewest + 1 if layout.name == "kitti" else 0)
-    if not layout.fewest <= count <= most:
-        needed = f"{layout.fewest}" if layout.fewest == most else f"{layout.fewest} to {most}"
-        raise LayoutError("layout", f"{layout.name} has {needed} columns; the table has {count}")
-
-
-def ask_classes(layout: Layout, facts: Facts) -> LayoutError:
-    """Return the error of a table whose class numbers mean something else in each file."""
-    return LayoutError(
-        "classes",
-        f"the class numbers of {layout.name} depend on the file: name the numbers of people in "
-        f"the query, for example classes=1; column 8 has {facts.seen(7)}",
-    )
-
-
-def _unknown(facts: Facts) -> LayoutError:
-    known = "; ".join(
-        f"{layout.name} ({layout.meaning})"
-        for layout in LAYOUTS
-        if layout.fewest <= facts.count <= max(len(layout.columns), layout.fewest)
-    )
-    instead = f". Known layouts of {facts.count} columns: {known}" if known else ""
-    return LayoutError(
-        "layout",
-        f"the {facts.count} columns fit no known layout; list them in the query, for example "
-        f"layout={_SIZE},conf,class{instead}",
-    )
+    return layout is None or layout in IN_ORDER

@@ -8,17 +8,10 @@ import numpy as np
 from models.geometry.rotation import Array, Index, Mask
 from surefoot.people import PEDESTRIANS, PersonClasses, SkipReason
 from surefoot.tabular import columns as roles
+from surefoot.tabular.choice import ask_classes, by_content, check_fit
 from surefoot.tabular.facts import Facts
 from surefoot.tabular.head import is_missing, read_head
-from surefoot.tabular.layouts import (
-    MOT,
-    Layout,
-    LayoutError,
-    ask_classes,
-    by_content,
-    check_fit,
-    in_usual_order,
-)
+from surefoot.tabular.layouts import MOT, Layout, LayoutError, in_usual_order
 from surefoot.tabular.lines import Bounds, Lines, check_lines, read_lines
 from surefoot.tabular.recognition import known_layout, plan_of
 
@@ -203,7 +196,9 @@ def _persons(
         return np.ones(len(lines), dtype=bool), ()
     found, inverse = np.unique(column, return_inverse=True)
     numbers = [None if np.isnan(number) else number for number in found.tolist()]
-    kind = np.array([number is None or classes.include(number) for number in numbers])
+    kind = np.array(
+        [each is None or np.isfinite(each) and classes.include(each) for each in numbers]
+    )
     by_default = options.classes is None and layout.classes is PEDESTRIANS
     if by_default and 1 in numbers and not kind.any():
         listed = ", ".join(f"{number:g}" for number in found[:_MOST_NAMED])

@@ -3,18 +3,10 @@
 import numpy as np
 
 from surefoot.tabular import columns as roles
+from surefoot.tabular.choice import by_head, check_count, of_columns, read_layout
 from surefoot.tabular.facts import Facts
 from surefoot.tabular.head import Head
-from surefoot.tabular.layouts import (
-    MOT,
-    Layout,
-    LayoutError,
-    by_head,
-    check_count,
-    in_usual_order,
-    of_columns,
-    read_layout,
-)
+from surefoot.tabular.layouts import MOT, Layout, LayoutError, in_usual_order
 from surefoot.tabular.lines import Plan
 
 _WIDEST = 10  # columns of a table without a header that are read

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from surefoot.people import read_classes
-from surefoot.tabular.layouts import LAYOUTS, LayoutError, read_layout
+from surefoot.tabular.choice import read_layout
+from surefoot.tabular.layouts import LAYOUTS, LayoutError
 from surefoot.tabular.reader import Options, read_table
 
 # A person, and what else is tracked: walks of 30 frames from frame 1.
@@ -273,3 +276,19 @@ def test_every_layout_has_a_name_that_reads_it():
     for layout in LAYOUTS:
         assert read_layout(layout.name) is layout
         assert layout.fewest <= max(len(layout.columns), 18)
+
+
+@given(st.data())
+def test_bytes_that_were_changed_are_read_or_refused(data):
+    body = data.draw(st.sampled_from([*KNOWN.values(), *UNCLEAR.values()]))[0][:600]
+    for _ in range(data.draw(st.integers(1, 5))):
+        at, length = data.draw(st.integers(0, len(body))), data.draw(st.integers(0, 4))
+        odd = [b",", b";", b"\t", b" ", b"\n", b"\r", b"nan", b"inf", b"1e999", b'"', b"\xff", b"#"]
+        body = body[:at] + data.draw(st.sampled_from(odd)) + body[at + length :]
+    layout = data.draw(st.sampled_from([None, *(each.name for each in LAYOUTS)]))
+    try:
+        found = read(body, layout=layout)
+    except LayoutError as error:
+        assert error.reason
+        return
+    assert all(len(rows) or name in found.broken for name, rows in found.rows.items())
