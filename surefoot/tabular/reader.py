@@ -10,9 +10,9 @@ from surefoot.people import PEDESTRIANS, PersonClasses, SkipReason
 from surefoot.tabular import columns as roles
 from surefoot.tabular.choice import ask_classes, by_content, check_fit
 from surefoot.tabular.facts import Facts
-from surefoot.tabular.head import is_missing, read_head
+from surefoot.tabular.head import Head, is_missing, read_head
 from surefoot.tabular.layouts import MOT, Layout, LayoutError, in_usual_order
-from surefoot.tabular.lines import Bounds, Lines, check_lines, read_lines
+from surefoot.tabular.lines import Bounds, Lines, Plan, check_lines, read_lines
 from surefoot.tabular.recognition import known_layout, plan_of
 
 _MOST_NAMED = 12  # classes in a message
@@ -72,6 +72,13 @@ def read_table(body: bytes, options: Options) -> TableTracks:
         raise LayoutError("", f"not a table of tracks: {first}")
     if not len(lines):
         return TableTracks(rows={}, broken={}, skipped=Counter())
+    with np.errstate(over="ignore", invalid="ignore"):  # those tracks are rejected by name
+        return _tracks_in(lines, head, layout, plan, shifted, options)
+
+
+def _tracks_in(
+    lines: Lines, head: Head, layout: Layout | None, plan: Plan, shifted: int, options: Options
+) -> TableTracks:
     names, tracks = _merged(lines)
     if head.header is None and in_usual_order(layout):
         ids = np.array([_as_number(name) for name in names])[tracks]

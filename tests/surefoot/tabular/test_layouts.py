@@ -288,7 +288,6 @@ def test_bytes_that_were_changed_are_read_or_refused(data):
     layout = data.draw(st.sampled_from([None, *(each.name for each in LAYOUTS)]))
     try:
         found = read(body, layout=layout)
-    except LayoutError as error:
-        assert error.reason
+    except LayoutError:
         return
     assert all(len(rows) or name in found.broken for name, rows in found.rows.items())
