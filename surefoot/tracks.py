@@ -88,10 +88,11 @@ def read_tracks(
         except TrackRejectedError as error:
             rejected[error.code] += 1
     skipped = {str(reason): count for reason, count in found.skipped.items()}
-    if skipped or rejected:
-        counts = {"skipped": skipped, "rejected": dict(rejected)}
+    if skipped:
         classes_seen = ", ".join(found.other_classes) or "none"
-        log.warning("%s: %s; classes of no person: %s", path, counts, classes_seen)
+        log.warning("%s: skipped tracks: %s; classes: %s", path, skipped, classes_seen)
+    if rejected:
+        log.info("%s: rejected tracks: %s", path, dict(rejected))
     return Tracks(in_order(tracks), skipped, rejected)
 
 

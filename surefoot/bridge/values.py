@@ -23,7 +23,7 @@ _FARTHEST = 1e9
 class MessageError(Exception):
     """A message that is not what its source's format says; `code` is stable, `detail` for people.
 
-    Codes: `too_large`, `malformed`, `not_finite`, `unsupported`, `time_out_of_range`.
+    Codes: `too_large`, `malformed`, `not_finite`, `unsupported`.
     """
 
     def __init__(self, code: str, detail: str) -> None:
@@ -174,7 +174,7 @@ def seconds(value: Any, what: str) -> float:
     except (TypeError, ValueError, OverflowError):
         found = math.nan
     if LAST_S < found < math.inf:
-        raise MessageError("time_out_of_range", f"{what}: {not_seconds(found)}")
+        raise MessageError("malformed", f"{what}: {not_seconds(found)}")
     return number(value, what)
 
 
