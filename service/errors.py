@@ -1,7 +1,10 @@
 """Errors that the service answers with a problem document (RFC 9457)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self
+
+from surefoot.people import SkipReason
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,9 +142,21 @@ class MalformedError(ServiceError):
 
 
 class NothingTakenError(ServiceError):
-    """A body of tracks of which none could be taken; `errors` has the reason of each."""
+    """A body of tracks none of which could be stored.
+
+    `errors` has the reason for each; `skipped` counts the tracks that were skipped, by reason.
+    """
 
     status, code = 422, "nothing_taken"
+
+    def __init__(
+        self,
+        detail: str,
+        errors: tuple[FieldError, ...] = (),
+        skipped: Mapping[SkipReason, int] | None = None,
+    ) -> None:
+        super().__init__(detail, errors)
+        self.skipped = skipped or {}
 
 
 class UnsupportedMediaTypeError(ServiceError):

@@ -19,7 +19,7 @@ _LONGEST_ERROR = 500
 _TOO_MUCH = (_DIED, "EffortExceededError", "MemoryError")
 _NEXT_SHARE, _LEAST_SHARE = 0.25, 1e-3
 _NAMED = 5  # tracks in a reason
-_LEFT_OUT = ServiceCode.TRACKS_LEFT_OUT
+_SKIPPED = ServiceCode.TRACKS_SKIPPED
 
 
 def request_estimate(
@@ -111,24 +111,24 @@ def budget_of(session: Session, camera_id: str) -> LookBudget:
     camera = session.get(CameraRecord, camera_id)
     if camera is None:
         return LookBudget()
-    kept = (each.values["share"] for each in camera.lacks if each.code == _LEFT_OUT)
+    kept = (each.values["share"] for each in camera.lacks if each.code == _SKIPPED)
     share = next((value for value in kept if isinstance(value, float)), 1.0)
     if camera.estimate_error is not None and camera.estimate_error.startswith(_TOO_MUCH):
         share *= _NEXT_SHARE ** max(camera.estimate_tries - 1, 0)
     return LookBudget(max(share, _LEAST_SHARE))
 
 
-def left_out_by(budget: LookBudget) -> Reasons:
+def skipped_by(budget: LookBudget) -> Reasons:
     """A reason that names tracks which a look had no budget for; none where it had for all."""
-    if not budget.left_out:
+    if not budget.skipped:
         return ()
-    names = list(dict.fromkeys(budget.left_out.values()))[:_NAMED]
+    names = list(dict.fromkeys(budget.skipped.values()))[:_NAMED]
     values: dict[str, Value] = {
-        "tracks": len(budget.left_out),
+        "tracks": len(budget.skipped),
         "track_ids": names,
         "share": budget.share,
     }
-    return (Reason(code=_LEFT_OUT, values=values),)
+    return (Reason(code=_SKIPPED, values=values),)
 
 
 def end_look(

@@ -33,7 +33,7 @@ class ServiceCode(StrEnum):
     OTHER_SOURCES = "other_sources"
     LOOKS_FAIL = "looks_fail"
     TRACKS_WAIT = "tracks_wait"
-    TRACKS_LEFT_OUT = "tracks_left_out"
+    TRACKS_SKIPPED = "tracks_skipped"
     BY_PICTURE = "by_picture"
     PICTURE_SHIFTED = "picture_shifted"
     PICTURE_FROZEN = "picture_frozen"

@@ -61,7 +61,8 @@ _opener = urllib.request.build_opener(_NoRedirect)
 class Client:
     """Takes detections of one camera in, and posts whole tracks; may be used by several threads.
 
-    `posted` counts tracks by what became of them: `accepted`, `duplicates`, `refused`, `lost`.
+    `posted` counts tracks: `accepted`, `duplicates`, `skipped`, `refused`, `lost`. Skipped ones are
+    no people, by their class; `skipped` counts them by the service's reasons.
     `clock_ahead_s` is by how much this machine's clock is ahead of the service's, to a second or
     so; None until it has answered.
     """
@@ -102,6 +103,7 @@ class Client:
             OSError: the spool cannot be made.
         """
         self.posted: Counter[str] = Counter()
+        self.skipped: Counter[str] = Counter()
         self.clock_ahead_s: float | None = None
         if not url.startswith(("http://", "https://")):
             raise ValueError(f"url: http:// or https:// is needed, got {url!r}")
@@ -126,6 +128,7 @@ class Client:
         self._unreadable: set[Path] = set()
         self._number = max((_number_of(path) for path in self._files()), default=0)
         self._open: dict[str, list[list[float]]] = {}  # rows of time and box
+        self._labels: dict[str, Counter[str | None]] = {}
         self._heard_s: dict[str, float] = {}
         self._done: list[dict[str, Any]] = []
         self._lock = threading.Lock()
@@ -144,15 +147,23 @@ class Client:
     ) -> None:
         self.close()
 
-    def add(self, track_id: object, box: Sequence[float], time_s: float | None = None) -> None:
-        """Take one detection in.
+    def add(
+        self,
+        track_id: object,
+        box: Sequence[float],
+        time_s: float | None = None,
+        label: str | float | None = None,
+    ) -> None:
+        """Add one detection.
 
-        A second one of the same time is left out, and one with numbers that are none.
+        A second one at the same time is ignored, and one with numbers that are not finite.
 
         Args:
             track_id: the tracker's.
             box: x1, y1, x2, y2.
-            time_s: when the picture was taken, in seconds since 1970; None: now.
+            time_s: when the image was taken, in seconds since 1970; None: now.
+            label: class of the detection, a name or a COCO number. A track has the class of most
+                of its detections; the service skips those that are no people.
         """
         at_s = time.time() if time_s is None else float(time_s)
         (x1, y1, x2, y2), (u, v), (du, dv) = map(float, box), self._factor, self._shift
@@ -168,6 +179,8 @@ class Client:
             if rows and (full or at_s - rows[-1][0] > self._silence_s):
                 self._finish(name)
             self._open.setdefault(name, []).append(row)
+            kind = None if label is None else str(label)
+            self._labels.setdefault(name, Counter())[kind] += 1
             self._heard_s[name] = time.monotonic()
 
     def end(self, track_id: object) -> None:
@@ -200,8 +213,13 @@ class Client:
     def _finish(self, name: str) -> None:
         rows = self._open.pop(name, None)
         self._heard_s.pop(name, None)
+        labels = self._labels.pop(name, Counter())
         if rows:
-            self._done.append({"id": name, "boxes": rows})
+            track: dict[str, Any] = {"id": name, "boxes": rows}
+            label = labels.most_common(1)[0][0]
+            if label is not None:
+                track["class"] = label
+            self._done.append(track)
 
     def _run(self) -> None:
         """Keep what is finished, and post what is kept, until the client is closed."""
@@ -317,9 +335,15 @@ class Client:
         accepted, duplicates = int(receipt["accepted"]), int(receipt["duplicates"])
         for each in receipt["rejected"]:
             log.warning("track %s is refused: %s: %s", each["id"], each["code"], each["detail"])
+        skipped: dict[str, int] = receipt.get("skipped", {})
+        for reason in skipped.keys() - self.skipped.keys():
+            log.warning("tracks are skipped: %s", reason)
+        self.skipped.update(skipped)
         self.posted.update(
             accepted=accepted, duplicates=duplicates, refused=len(receipt["rejected"])
         )
+        if skipped:
+            self.posted["skipped"] += sum(skipped.values())
 
     def _see_clock(self, date: str | None) -> None:
         if date is None:

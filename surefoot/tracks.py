@@ -1,78 +1,121 @@
-"""Tracks of people, read of the files that trackers write."""
+"""Tracks of people, read from the files that trackers write."""
 
-import csv
-from collections import defaultdict
-from collections.abc import Iterator
+import logging
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from models.errors import ShapeError
+from models.geometry.rotation import Array
 from models.tracks.trajectory import Trajectory, by_end
+from surefoot.people import read_classes
+from surefoot.tabular.layouts import LayoutError
+from surefoot.tabular.reader import Options, TableTracks, read_table
+from surefoot.track_rules import (
+    TrackRejectedError,
+    check_finite,
+    check_order_and_length,
+    check_upright,
+    feet_of,
+    refuse,
+)
 
 Track = Trajectory
 
-_MOT_CELLS = 6  # frame, id, left, top, width, height; others are not looked at
-_FOOT = ("track_id", "time_s", "u_px", "v_px")
+log = logging.getLogger("surefoot.tracks")
 
-# The track, the time in seconds, u and v of the foot, v of the head.
-_Row = tuple[str, float, float, float, float]
+
+class Tracks(list[Track]):
+    """Tracks of a file in the order of their ends.
+
+    `skipped` counts tracks that are not used by reason (`not_a_person`, `ignored_by_confidence`,
+    `no_track_id`), `rejected` tracks that break a limit by code (`too_short`, ...). The service
+    answers a post of the same file with the same counts.
+    """
+
+    def __init__(
+        self, tracks: Iterable[Track], skipped: Mapping[str, int], rejected: Mapping[str, int]
+    ) -> None:
+        super().__init__(tracks)
+        self.skipped = dict(skipped)
+        self.rejected = dict(rejected)
 
 
 def read_tracks(
-    path: str | Path, *, frame_rate_hz: float | None = None, started_at_s: float = 0.0
-) -> list[Track]:
-    """The tracks of a file that are long enough to be taken, in the order of their ends.
-
-    Two forms: MOTChallenge text, `frame,id,left,top,width,height,...` a line, frames and pixels
-    counted from 1; and CSV with the columns track_id, time_s, u_px, v_px (the foot).
+    path: str | Path,
+    *,
+    frame_rate_hz: float | None = None,
+    started_at_s: float = 0.0,
+    layout: str | None = None,
+    classes: str | None = None,
+) -> Tracks:
+    """Read the tracks of a text table: MOTChallenge text, its dialects, or CSV with a header.
 
     Args:
         path: of the file.
-        frame_rate_hz: of MOTChallenge text.
-        started_at_s: the time of its first frame, seconds since the Unix epoch.
+        frame_rate_hz: of a table with frame numbers.
+        started_at_s: time of the first frame, seconds since the Unix epoch.
+        layout: name of a layout (`mot`, `boxmot`, ...) or its columns, such as
+            `frame,id,x1,y1,x2,y2`; needed if the table can be read in several ways.
+        classes: class numbers or names of people, such as `1,7` or `person`.
 
     Raises:
-        ShapeError: the file is missing, is in neither form, or has no frame rate.
+        ShapeError: the file is missing, no line can be read, or the layout, the classes or the
+            frame rate are not known.
     """
     try:
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            first = file.readline()
-            file.seek(0)
-            has_names = set(_FOOT) <= set(first.strip().split(","))
-            if not has_names and frame_rate_hz is None:
-                raise ShapeError(f"{path}: frame_rate_hz is needed of MOTChallenge text")
-            rows = list(_named(file) if has_names else _mot(file, frame_rate_hz or 1, started_at_s))
-    except (OSError, TypeError, ValueError, IndexError) as error:
-        raise ShapeError(f"{path}: neither MOTChallenge text nor CSV of feet: {error}") from error
-    points: dict[str, dict[float, tuple[float, float, float]]] = defaultdict(dict)
-    for name, time_s, *point in rows:
-        points[name][time_s] = (point[0], point[1], point[2])
-    tracks = (_track(each) for each in points.values())
-    return by_end(track for track in tracks if track.long_enough)
+        body = Path(path).read_bytes()
+        options = Options(
+            frame_rate_hz=frame_rate_hz,
+            started_at_s=started_at_s,
+            layout=layout,
+            classes=None if classes is None else read_classes(classes),
+        )
+        found = read_table(body, options)
+    except LayoutError as error:
+        where = f"{error.field}: " if error.field else ""
+        raise ShapeError(f"{path}: {where}{error.reason}") from error
+    except ValueError as error:
+        raise ShapeError(f"{path}: classes: {error}") from error
+    except OSError as error:
+        raise ShapeError(f"{path}: {error.strerror or error}") from error
+    tracks, rejected = [], Counter[str]()
+    for name in found.rows:
+        try:
+            tracks.append(_track(found, name))
+        except TrackRejectedError as error:
+            rejected[error.code] += 1
+    skipped = {str(reason): count for reason, count in found.skipped.items()}
+    if skipped:
+        classes_seen = ", ".join(found.other_classes) or "none"
+        log.warning("%s: skipped tracks: %s; classes: %s", path, skipped, classes_seen)
+    if rejected:
+        log.info("%s: rejected tracks: %s", path, dict(rejected))
+    return Tracks(by_end(tracks), skipped, rejected)
 
 
-def _named(lines: Iterator[str]) -> Iterator[_Row]:
-    for row in csv.DictReader(lines):
-        name, *numbers = (row[column] for column in _FOOT)
-        time_s, u, v = map(float, numbers)
-        yield name, time_s, u, v, np.nan
+def _track(found: TableTracks, name: str) -> Track:
+    """Return one track.
+
+    Raises:
+        TrackRejectedError: a line cannot be read, or a limit is broken.
+    """
+    if name in found.broken:
+        refuse(found.broken[name])
+    rows = found.rows[name]
+    check_finite(rows)
+    check_order_and_length(rows[:, 0])
+    has_boxes = rows.shape[1] == 5
+    if has_boxes:
+        check_upright(rows[:, 1:])
+    feet = feet_of(rows)
+    top_v = _tops(rows) if has_boxes else None
+    return Track(time_s=feet[:, 0].copy(), uv=feet[:, 1:].copy(), top_v=top_v)
 
 
-def _mot(lines: Iterator[str], frame_rate_hz: float, started_at_s: float) -> Iterator[_Row]:
-    for line in lines:
-        if not line.strip():
-            continue
-        cells = line.split(",")
-        frame, _, left, top, width, height = map(float, cells[:_MOT_CELLS])
-        time_s = started_at_s + (frame - 1) / frame_rate_hz
-        top_v = top - 1 if top - 1 > 1 else np.nan  # cut by the border, as of `tops_of_boxes`
-        yield cells[1].strip(), time_s, left - 1 + width / 2, top - 1 + height, top_v
-
-
-def _track(points: dict[float, tuple[float, float, float]]) -> Track:
-    rows = np.array([(time_s, *points[time_s]) for time_s in sorted(points)])
-    tops = rows[:, 3]
-    return Track(
-        time_s=rows[:, 0], uv=rows[:, 1:3].copy(), top_v=tops if np.isfinite(tops).any() else None
-    )
+def _tops(rows: Array) -> Array | None:
+    """Return upper edges (N,), NaN where the image border may cut the box, or None if all are."""
+    tops = np.where(rows[:, 2] > 1, rows[:, 2], np.nan)
+    return tops if np.isfinite(tops).any() else None

@@ -49,7 +49,7 @@ class StaleWatch:
         waits = {camera_id: now_s - since_s for camera_id, (_, since_s) in self._waiting.items()}
         long = {camera_id for camera_id, s in waits.items() if s > settings.stale_after_s}
         # Of hundreds, twelve times a minute: nothing can be wrong with any other.
-        lacking = cameras.lacking(session, ServiceCode.TRACKS_LEFT_OUT)
+        lacking = cameras.lacking(session, ServiceCode.TRACKS_SKIPPED)
         for camera in cameras.failing(session, besides=firing.keys() | long | lacking):
             waits_s = waits.get(camera.id, 0.0)
             reason = _why_stale(camera, settings, waits_s)
@@ -80,8 +80,8 @@ def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reas
     if waits_s > settings.stale_after_s:
         waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
         return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
-    left_out = (lack for lack in camera.lacks if lack.code == ServiceCode.TRACKS_LEFT_OUT)
-    return next(left_out, None)
+    skipped = (lack for lack in camera.lacks if lack.code == ServiceCode.TRACKS_SKIPPED)
+    return next(skipped, None)
 
 
 def _open(
@@ -94,7 +94,7 @@ def _open(
         camera.id,
         AlertKind.STALE,
         # Without some of its tracks a camera is watched all the same.
-        Severity.WARNING if reason.code == ServiceCode.TRACKS_LEFT_OUT else Severity.CRITICAL,
+        Severity.WARNING if reason.code == ServiceCode.TRACKS_SKIPPED else Severity.CRITICAL,
         drift={},
         changed_at=since,
         reasons=(reason,),

@@ -10,6 +10,7 @@ from pydantic import (
     AfterValidator,
     AwareDatetime,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     ModelWrapValidatorHandler,
@@ -29,6 +30,7 @@ from service.api.ignored import note_ignored
 from service.degrees import in_degrees
 from service.enums import ReferenceState
 from service.reasons import CODES
+from surefoot.times import restore_plus
 
 _EARLIEST, _LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 1, 1, tzinfo=UTC)
 # Of numbers beyond these nothing can be computed, let alone drawn.
@@ -49,7 +51,11 @@ def _without_nul(value: str) -> str:
     return value
 
 
-Moment = Annotated[AwareDatetime, AfterValidator(_checked_moment)]
+def _with_plus(value: object) -> object:
+    return restore_plus(value) if isinstance(value, str) else value
+
+
+Moment = Annotated[AwareDatetime, BeforeValidator(_with_plus), AfterValidator(_checked_moment)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Text = Annotated[str, AfterValidator(_without_nul)]

@@ -25,10 +25,11 @@ from service.cameras import tracks
 from service.errors import MalformedError, ServiceError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
-from service.formats.mot import read_classes, read_mot
 from service.formats.scaling import read_size
 from service.formats.track import Batch, Clock, Limits
+from service.formats.track_text import people_classes, read_text
 from service.store.cameras import Picture
+from surefoot.people import PEDESTRIANS
 
 
 def _rows(what: str, numbers: int) -> dict[str, Any]:
@@ -66,7 +67,11 @@ DESCRIBED_TRACK: dict[str, Any] = {
         "frame_boxes": _rows("[frame, x1, y1, x2, y2]", 5),
         "class": {
             "type": ["string", "number", "null"],
-            "description": "what it is of, by name or COCO's number: no person is left out",
+            "description": "name or COCO number from 0; a track that is no person is skipped",
+        },
+        "confidence": {
+            "type": ["number", "null"],
+            "description": "0 marks a track to be ignored: it is skipped",
         },
         **_SIZE,
     },
@@ -83,16 +88,18 @@ class RejectionOut(Out):
 
 
 class ReceiptOut(Out):
-    """What became of the posted tracks.
+    """Counts of the posted tracks.
 
-    Where they stand, `left_out` of them were of no person, and `ignored` names unknown fields: of
-    a body over 1 MiB the first of its own and of each track.
+    `skipped` counts tracks by reason: `not_a_person`, `ignored_by_confidence`, `no_track_id`.
+    `detail` explains an answer in which all tracks were skipped. `ignored` names unknown fields;
+    of a body over 1 MiB, the first of the body and of each track.
     """
 
     accepted: int
     duplicates: int
     rejected: list[RejectionOut] = Field(validation_alias="rejections")
-    left_out: int = 0
+    skipped: dict[str, int] = Field(default_factory=dict)
+    detail: str | None = None
     ignored: list[str] = Field(default_factory=list)
 
 
@@ -132,6 +139,7 @@ class Posted:
     frame_rate_hz: float | None = None
     started_at: str | None = None
     classes: str | None = None
+    layout: str | None = None
     size: str | None = None
     normalised: bool | None = None
 
@@ -142,9 +150,20 @@ async def posted(
     source: Annotated[str, Query(min_length=1, max_length=200)] = DEFAULT_SOURCE,
     frame_rate_hz: Annotated[float | None, Query(gt=0, le=1000)] = None,
     started_at: str | None = None,
-    classes: Annotated[str | None, Query(description="of text/csv: who is a person")] = None,
+    classes: Annotated[
+        str | None,
+        Query(description="classes of people, numbers or names: `0`, `1,7` or `person`"),
+    ] = None,
+    layout: Annotated[
+        str | None,
+        Query(
+            description="text/csv: `mot`, `mot-gt`, `cvat`, `boxmot`, `conf-last`, `mcmot`, "
+            "`visdrone`, `corners`, `corners-size`, `kitti`, `sdd`, `towncentre`, `aicity`, or a "
+            "list of columns such as `frame,id,x1,y1,x2,y2,conf`"
+        ),
+    ] = None,
     size: Annotated[
-        str | None, Query(description="width,height of the picture that the numbers are of")
+        str | None, Query(description="width,height of the image that the numbers refer to")
     ] = None,
     normalised: Annotated[bool | None, Query(description="numbers are shares, 0 to 1")] = None,
 ) -> Posted:
@@ -156,6 +175,7 @@ async def posted(
         frame_rate_hz=frame_rate_hz,
         started_at=started_at,
         classes=classes,
+        layout=layout,
         size=size,
         normalised=normalised,
     )
@@ -169,13 +189,14 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
         OverloadedError: other large bodies are being read all the time.
     """
     source = formats.read_source(came.source)
-    people = None if came.classes is None else read_classes(came.classes)
+    classes = None if came.classes is None else people_classes(came.classes)
     limits = Limits(
         width=camera.width,
         height=camera.height,
         now_s=time.time(),
         max_ahead_s=state.settings.max_ahead_s,
         fisheye=camera.fisheye,
+        classes=classes or PEDESTRIANS,
     )
     try:
         size = None if came.size is None else read_size(came.size)
@@ -195,7 +216,7 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
         if came.media_type == "application/x-ndjson":
             return formats.read_ndjson(came.body, source, clock, limits)
         if came.media_type == "text/csv":
-            return read_mot(came.body, source, clock, limits, people)
+            return read_text(came.body, source, clock, limits, layout=came.layout, classes=classes)
     raise UnsupportedMediaTypeError(
         "Content-Type: application/json, application/x-ndjson or text/csv is needed, "
         f"got {came.media_type or 'none'}"
@@ -209,7 +230,7 @@ def _take(state: AppState, camera_id: str, came: Posted, caller: Caller | None) 
     except ServiceError as error:
         state.posts.note_error(camera_id, error)
         raise
-    state.posts.note(camera_id, receipt.accepted, receipt.duplicates, receipt.rejections)
+    state.posts.note(camera_id, receipt)
     body = ReceiptOut.model_validate(receipt).model_dump_json(exclude_defaults=True)
     return Response(body, 202, media_type="application/json")
 

@@ -21,6 +21,7 @@ from service.store import cameras, references, tracks
 from service.store.cameras import Picture
 from service.store.engines.store import Store, joined
 from service.store.tracks import pack
+from surefoot.people import SkipReason
 
 _MOST_PICTURES = 10_000
 _BEYOND = 1.5  # times `keep_mb` that may lie there until the next retention
@@ -153,12 +154,15 @@ class Watched:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Receipt:
-    """The fate of the tracks of one request."""
+    """The fate of the tracks of one request; `other_classes` are classes that are no person."""
 
+    source: str
     accepted: int
     duplicates: int
     rejections: tuple[Rejection, ...]
-    left_out: int
+    skipped: dict[SkipReason, int]
+    other_classes: tuple[str, ...]
+    detail: str | None
     ignored: tuple[str, ...]
 
 
@@ -226,21 +230,48 @@ def receive_tracks(
         with joined(connection) as session:
             request_estimate(session, queue, camera_id, watched=watched)
     return Receipt(
+        source=batch.source,
         accepted=added,
         duplicates=len(batch.tracks) - added,
         rejections=batch.rejections,
-        left_out=batch.left_out,
+        skipped=batch.skipped,
+        other_classes=batch.other_classes,
+        detail=_all_skipped(batch),
         ignored=batch.ignored,
     )
+
+
+def _all_skipped(batch: Batch) -> str | None:
+    """Return why nothing of a request was stored, None if it had other tracks than skipped ones."""
+    if batch.tracks or not batch.skipped:
+        return None
+    parts = []
+    for reason, count in batch.skipped.items():
+        text = _SKIPPED[reason]
+        if reason == SkipReason.NOT_A_PERSON and batch.other_classes:
+            text += f" (classes {', '.join(batch.other_classes)}); name the classes of people "
+            text += "with ?classes= if they are"
+        parts.append(f"{count} {text}")
+    return f"No track was stored: {'; '.join(parts)}."
+
+
+_SKIPPED = {
+    SkipReason.NOT_A_PERSON: "not of a person",
+    SkipReason.CONFIDENCE: "with confidence 0 throughout, which marks detections to be ignored",
+    SkipReason.NO_ID: "without a track id: detections are not tracks",
+}
 
 
 def _nothing_taken(batch: Batch) -> NothingTakenError:
     count = len(batch.rejections)
     first = batch.rejections[0]
+    skipped = sum(batch.skipped.values())
+    beside = f", {skipped} others were skipped" if skipped else ""
     return NothingTakenError(
-        f"tracks: none of {count} could be taken, the first since: {first.detail}",
+        f"tracks: none of {count} could be taken{beside}, the first because: {first.detail}",
         tuple(
             FieldError(pointer=f"/tracks/{each.index}", reason=f"{each.code}: {each.detail}")
             for each in batch.rejections
         ),
+        batch.skipped,
     )

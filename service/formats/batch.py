@@ -1,6 +1,7 @@
 """Requests that carry tracks as JSON and NDJSON, and what all forms have in common."""
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
@@ -25,16 +26,18 @@ from service.formats.track import (
     Clock,
     IncomingTrack,
     Limits,
-    NoPersonError,
     Rejection,
-    TrackRejectedError,
+    TrackSkippedError,
     is_text,
-    refuse,
 )
+from surefoot.people import SkipReason
+from surefoot.times import restore_plus
+from surefoot.track_rules import TrackRejectedError, refuse
 
 DEFAULT_SOURCE = "unnamed"
 _FAR_S = 1e12
-MOST_IGNORED = 20  # names of unknown fields that an answer says
+MOST_IGNORED = 20  # names of unknown fields in an answer
+MOST_CLASSES = 12  # classes in a message
 MAX_CPU_S = 10.0  # of reading one body: the largest honest ones take one or two
 _MOST_ENDS = 4 * MAX_TRACKS  # of lines, blank ones among them
 
@@ -91,6 +94,7 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
         raise MalformedError.of_field(*str(error).split(": ", 1)) from error
     try:
         return collect(
+            source,
             (
                 (index, raw, partial(read_track, raw, source, clock, limits))
                 for index, raw in enumerate(tracks)
@@ -122,7 +126,7 @@ def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch
             else:
                 yield index, raw, partial(read_track, raw, source, clock, limits)
 
-    return collect(items())
+    return collect(source, items())
 
 
 def read_source(value: Any) -> str:
@@ -150,48 +154,52 @@ def read_rate(value: Any) -> float:
 
 
 def read_time(value: Any) -> float:
-    """The start in seconds since the epoch, of an RFC 3339 time with a zone or such a number.
+    """Return seconds since the epoch of an RFC 3339 time with a zone, or of such a number.
 
     Raises:
-        MalformedError: neither of the two.
+        MalformedError: the value is neither.
     """
     wrong = partial(MalformedError.of_field, "started_at")
     if isinstance(value, str):
+        needed = "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z"
         try:
-            moment = datetime.fromisoformat(value)
+            moment = datetime.fromisoformat(restore_plus(value))
         except ValueError as error:
-            raise wrong(f"RFC 3339 is needed: {error}") from error
+            hint = "; encode + as %2B in a query" if " " in value else ""
+            raise wrong(f"{needed}{hint}; got {value!r:.40}") from error
         if moment.tzinfo is None:
-            raise wrong(f"a time with its zone is needed, got {value!r:.40}")
+            raise wrong(f"{needed}; got {value!r:.40}")
         return moment.timestamp()
     # A whole number may be larger than any float.
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _FAR_S:
-        raise wrong(f"RFC 3339 or seconds since 1970 are needed, got {value!r:.40}")
+        raise wrong(f"must be an RFC 3339 time or seconds since 1970; got {value!r:.40}")
     return float(value)
 
 
 def collect(
+    source: str,
     items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]],
-    left_out: int = 0,
     ignored: Iterable[str] = (),
 ) -> Batch:
-    """The batch of tracks, each given with its index, what it was and how to read it.
+    """Return the batch of tracks, each given with its index, its raw value and its reader.
 
-    Fields of tracks that are unknown join those that are `ignored` already.
+    Unknown fields of tracks are added to `ignored`.
 
     Raises:
         TooLargeError: reading them takes too long.
     """
     with reading():
-        return _collected(items, left_out, ignored)
+        return _collected(source, items, ignored)
 
 
 def _collected(
+    source: str,
     items: Iterable[tuple[int, Any, Callable[[], IncomingTrack]]],
-    left_out: int,
     ignored: Iterable[str],
 ) -> Batch:
     tracks, rejections = [], []
+    skipped: Counter[SkipReason] = Counter()
+    others: dict[str, None] = {}
     names = dict.fromkeys(islice(map(brief_name, ignored), MOST_IGNORED))
     for index, raw, read in items:
         check_effort()
@@ -200,8 +208,10 @@ def _collected(
             names |= dict.fromkeys(f"tracks/*/{brief_name(name)}" for name in unknown)
         try:
             tracks.append(read())
-        except NoPersonError:
-            left_out += 1
+        except TrackSkippedError as error:
+            skipped[error.reason] += 1
+            if error.reason == SkipReason.NOT_A_PERSON and len(others) < MOST_CLASSES:
+                others.setdefault(brief_name(str(error.label)))
         except TrackRejectedError as refused:
             name = raw.get("id") if isinstance(raw, dict) else getattr(raw, "id", None)
             known = isinstance(name, str | int) and not isinstance(name, bool)
@@ -215,9 +225,11 @@ def _collected(
                 )
             )
     return Batch(
+        source=source,
         tracks=tuple(tracks),
         rejections=tuple(rejections),
-        left_out=left_out,
+        skipped=dict(skipped),
+        other_classes=tuple(others),
         ignored=tuple(names),
     )
 

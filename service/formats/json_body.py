@@ -65,6 +65,7 @@ class _Track(_Named, gc=False):
     frame_boxes: _Rows = UNSET
     size: tuple[float, float] | None = None
     normalised: bool | None = None
+    confidence: str | float | None = None
 
 
 class _KnownTrack(_Track, gc=False, forbid_unknown_fields=True):
@@ -159,7 +160,11 @@ def read_track_text(text: bytes | Raw, *, stand_ins: bool = False) -> Any:
     except msgspec.ValidationError as error:
         return _unreadable(_name_of(text, stand_ins=stand_ins), str(error))
     rows = {form: found for form in _FORMS if (found := getattr(track, form)) is not UNSET}
-    given = {"size": track.size, "normalised": track.normalised}
+    given = {
+        "size": track.size,
+        "normalised": track.normalised,
+        "confidence": track.confidence,
+    }
     name = _as_given(track.id, stand_ins=stand_ins)
     return {"id": name, "class": track.kind, **given, **rows, **unknown}
 

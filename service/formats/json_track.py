@@ -12,44 +12,40 @@ from models.geometry.rotation import Array
 from service.formats.json_body import UnreadableTrack
 from service.formats.scaling import FIELDS as SIZE_FIELDS
 from service.formats.track import (
-    COCO_PEOPLE,
     FOOT_COLUMNS,
-    MAX_POINTS,
     Clock,
     IncomingTrack,
     Limits,
-    NoPersonError,
-    TrackRejectedError,
+    TrackSkippedError,
     check_heads,
     check_track,
-    refuse,
     track_name,
 )
+from surefoot.people import skip_reason
+from surefoot.track_rules import MAX_POINTS, TrackRejectedError, refuse
 
 LARGEST = 2**53  # up to which floats tell whole numbers apart
-_NAMES = frozenset(
-    ("person", "people", "pedestrian", "human", "walker", "man", "woman", "child", "adult")
-)
 _LIST = (list, tuple)  # a row; of large bodies, tuples
 # How many numbers a row has: of a point three, or five with its head.
 _FORMS = {"points": (3, 5), "boxes": (5,), "frames": (3, 5), "frame_boxes": (5,)}
-TRACK_FIELDS = frozenset((*_FORMS, *SIZE_FIELDS, "id", "class"))
+TRACK_FIELDS = frozenset((*_FORMS, *SIZE_FIELDS, "id", "class", "confidence"))
 
 
 def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingTrack:
-    """The track of a JSON object `{"id", "points" | "boxes" | "frames" | "frame_boxes", "class"?}`.
+    """Return the track of `{"id", "points" | "boxes" | "frames" | "frame_boxes", "class"?}`.
 
-    `size` or `normalised` in it is of it alone; else what its body says counts.
+    `size` and `normalised` of a track override those of its body. `confidence` 0 marks a track to
+    be ignored.
 
     Raises:
         TrackRejectedError: with a code, the field, the limit and the value received.
-        NoPersonError: its class is none of a person; null is none at all.
+        TrackSkippedError: the track is not a person, or is marked to be ignored.
     """
     if isinstance(raw, UnreadableTrack):
         raise TrackRejectedError(raw.code, raw.detail)
     if not isinstance(raw, dict):
         refuse(f"a track is an object, got {type(raw).__name__}")
-    _check_person(raw.get("class"))
+    _check_person(raw, limits)
     given = [name for name in _FORMS if name in raw]
     if len(given) != 1:
         refuse(
@@ -75,19 +71,20 @@ def read_track(raw: Any, source: str, clock: Clock, limits: Limits) -> IncomingT
     return replace(check_track(name, source, rows[:, :FOOT_COLUMNS], limits), heads=heads)
 
 
-def _check_person(value: Any) -> None:
-    """Pass silently if a class is of a person, by English name or COCO's number, or not given.
+def _check_person(raw: dict[str, Any], limits: Limits) -> None:
+    """Check that a track is a pedestrian, and to be used.
 
     Raises:
-        NoPersonError: it is of something else.
-        TrackRejectedError: it is neither text nor a number.
+        TrackSkippedError: it is not.
+        TrackRejectedError: the class is neither text nor a number.
     """
-    if value is None:
-        return
-    if isinstance(value, bool) or not isinstance(value, str | int | float):
-        refuse(f"class: text or a number is needed, got {value!r:.60}")
-    if not (value.strip().lower() in _NAMES if isinstance(value, str) else value in COCO_PEOPLE):
-        raise NoPersonError
+    label = raw.get("class")
+    try:
+        reason = skip_reason(label, raw.get("confidence"), limits.classes)
+    except ValueError as error:
+        refuse(f"class: {error}")
+    if reason is not None:
+        raise TrackSkippedError(reason, label)
 
 
 def _numbers(form: str, value: Any, taken: tuple[int, ...]) -> Array:

@@ -1,27 +1,29 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
-from dataclasses import dataclass, replace
-from typing import Any, NoReturn
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
-from models.tracks.trajectory import TRACK_MIN_DURATION_S, TRACK_MIN_POINTS
 from service.formats.scaling import Scaling, read_scaling
+from surefoot.people import PEDESTRIANS, PersonClasses, SkipReason
+from surefoot.times import LAST_S, not_seconds
+from surefoot.track_rules import (
+    TrackRejectedError,
+    check_finite,
+    check_order_and_length,
+    check_upright,
+    feet_of,
+    refuse,
+)
 
-# Of detectors trained on COCO, BoxMOT's among them.
-COCO_PEOPLE = frozenset((0.0,))
-MAX_POINTS = 10_000
 MAX_TRACKS = 5_000
 MAX_ID_LENGTH = 200
-# Nobody takes an hour to walk through a picture, or is the same person to a tracker that has not
-# seen them for ten minutes: the longest of our recordings are 46 minutes and 3 s.
-MAX_DURATION_S, MAX_GAP_S = 3_600.0, 600.0
 # A foot may be below the picture; one a whole picture away from it is no foot.
 MAX_OUTSIDE_IMAGES = 1.0
 FOOT_COLUMNS = 3  # of a point: time, u and v; after them its head's, where it carries one
-_YEAR_9999_S = 253_402_300_799.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,14 +58,17 @@ class Rejection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """Tracks as read of a request; `left_out` lines or tracks of it were of no person.
+    """Tracks of a request.
 
-    `ignored` names fields of it that nobody knows here.
+    `skipped` counts tracks by reason; `other_classes` are the first classes that are no person.
+    `ignored` names unknown fields.
     """
 
+    source: str
     tracks: tuple[IncomingTrack, ...]
     rejections: tuple[Rejection, ...]
-    left_out: int = 0
+    skipped: dict[SkipReason, int] = field(default_factory=dict)
+    other_classes: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
 
 
@@ -89,6 +94,7 @@ class Limits:
     max_ahead_s: float
     scaling: Scaling | None = None
     fisheye: Intrinsics | None = None  # the lens, where it has no picture of some pixels
+    classes: PersonClasses = PEDESTRIANS
 
     def of_size(self, size: Any, normalised: Any) -> "Limits":
         """The limits of numbers of a picture as a request names it; the same where it does not.
@@ -111,26 +117,13 @@ class Limits:
         return rows if self.scaling is None else self.scaling.applied(rows)
 
 
-class NoPersonError(Exception):
-    """A track is of something that does not walk, as its class says."""
+class TrackSkippedError(Exception):
+    """A track that is left out without being an error of its sender; `label` is its class."""
 
-
-class TrackRejectedError(Exception):
-    """One track breaks a limit; the others of its request do not suffer."""
-
-    def __init__(self, code: str, detail: str) -> None:
-        super().__init__(detail)
-        self.code = code
-        self.detail = detail
-
-
-def refuse(detail: str) -> NoReturn:
-    """Refuse a track that cannot be read.
-
-    Raises:
-        TrackRejectedError: always.
-    """
-    raise TrackRejectedError("malformed", detail)
+    def __init__(self, reason: SkipReason, label: object) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.label = label
 
 
 def check_heads(rows: Array, size: tuple[int, int]) -> None:
@@ -139,7 +132,7 @@ def check_heads(rows: Array, size: tuple[int, int]) -> None:
     Raises:
         TrackRejectedError: a head that is not finite, not above its foot, or far outside.
     """
-    _check_finite(rows)
+    check_finite(rows)
     above = rows[:, 4] < rows[:, 2]
     if not above.all():
         at = int(np.argmin(above))
@@ -156,38 +149,13 @@ def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> Inco
     Raises:
         TrackRejectedError: with a code, the field, the limit and the value received.
     """
-    if len(rows) > MAX_POINTS:
-        raise TrackRejectedError(
-            "too_many_points", f"points: at most {MAX_POINTS} a track are taken, got {len(rows)}"
-        )
-    _check_finite(rows)
-    time_s = rows[:, 0]
-    _check_times(time_s, limits)
-    increasing = np.diff(time_s) > 0
-    if not increasing.all():
-        at = int(np.argmin(increasing)) + 1
-        raise TrackRejectedError(
-            "time_not_increasing",
-            f"points/{at}/0: must be later than the point before, {time_s[at - 1]:.3f}, "
-            f"got {time_s[at]:.3f}",
-        )
-    duration_s = float(time_s[-1] - time_s[0]) if len(rows) else 0.0
-    if len(rows) < TRACK_MIN_POINTS or duration_s < TRACK_MIN_DURATION_S - 1e-6:
-        raise TrackRejectedError(
-            "too_short",
-            f"{len(rows)} points over {duration_s:.1f} s; at least {TRACK_MIN_POINTS} points "
-            f"over {TRACK_MIN_DURATION_S:g} s are needed",
-        )
-    _check_lengths(time_s)
-    boxes = None
-    points = rows
-    if rows.shape[1] == 5:
-        boxes = rows[:, 1:]
-        upright = (boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1])
-        if not upright.all():
-            at = int(np.argmin(upright))
-            refuse(f"boxes/{at}: x1 < x2 and y1 < y2 are needed, got {boxes[at].tolist()}")
-        points = np.column_stack([time_s, (boxes[:, 0] + boxes[:, 2]) / 2, boxes[:, 3]])
+    check_finite(rows)
+    _check_times(rows[:, 0], limits)
+    check_order_and_length(rows[:, 0])
+    boxes = None if rows.shape[1] == FOOT_COLUMNS else rows[:, 1:]
+    if boxes is not None:
+        check_upright(boxes)
+    points = feet_of(rows)
     _check_inside(points[:, 1:], (limits.width, limits.height))
     if limits.fisheye is not None:
         _check_seen(points[:, 1:], limits.fisheye)
@@ -218,50 +186,22 @@ def is_text(value: str) -> bool:
         return False
 
 
-def _check_finite(rows: Array) -> None:
-    finite = np.isfinite(rows).all(axis=1)
-    if not finite.all():
-        at = int(np.argmin(finite))
-        raise TrackRejectedError(
-            "not_finite", f"points/{at}: finite numbers are needed, got {rows[at].tolist()}"
-        )
-
-
 def _check_times(time_s: Array, limits: Limits) -> None:
     in_range = (time_s >= 0) & (time_s <= limits.now_s + limits.max_ahead_s)
     if in_range.all():
         return
     at = int(np.argmin(in_range))
     got = float(time_s[at])
+    if got > LAST_S:
+        raise TrackRejectedError("time_out_of_range", f"points/{at}/0: {not_seconds(got)}")
     needed = "seconds from 1970 on are needed"
-    if got > _YEAR_9999_S:
-        needed += "; these look like milliseconds"
-    elif got > 0:
+    if got > 0:
         needed = (
             f"at most {limits.max_ahead_s:g} s ahead of this service's clock, "
             f"{limits.now_s:.3f}, are taken; this is {got - limits.now_s:.3f} s ahead: "
             "one of the two clocks, or a zone, is wrong"
         )
     raise TrackRejectedError("time_out_of_range", f"points/{at}/0: {needed}, got {got:.3f}")
-
-
-def _check_lengths(time_s: Array) -> None:
-    """Refuse times that a wrong clock or frame rate makes, and nobody's walk."""
-    duration_s = float(time_s[-1] - time_s[0])
-    if duration_s > MAX_DURATION_S:
-        raise TrackRejectedError(
-            "too_long",
-            f"points: at most {MAX_DURATION_S:g} s a track are taken, got {duration_s:.1f} s: "
-            "the clock or frame_rate_hz is wrong, or a track of several people is to be cut",
-        )
-    gap_s = np.diff(time_s)
-    if gap_s.max() > MAX_GAP_S:
-        at = int(np.argmax(gap_s)) + 1
-        raise TrackRejectedError(
-            "gap",
-            f"points/{at}/0: at most {MAX_GAP_S:g} s after the point before are taken, got "
-            f"{gap_s[at - 1]:.1f} s: what comes after such a gap is a track of its own",
-        )
 
 
 def _check_inside(uv: Array, size: tuple[int, int], what: str = "points") -> None:

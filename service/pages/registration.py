@@ -16,11 +16,12 @@ from service.api.middleware.pages import render
 from service.api.schemas import Body, Finite, Triple
 from service.cameras import cameras
 from service.formats.calibration_file import CalibrationFile, read_calibration
-from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
+from service.formats.track_text import read_text
 from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
 from service.pages.registration_form import RegistrationForm
+from service.wording.connecting import skipped_words
 from service.wording.language import N_, _, _n
 from service.wording.typed_pose import (
     Saying,
@@ -174,10 +175,10 @@ def tracks(
     height: Annotated[int, Query(gt=0, le=100_000)],
     frame_rate_hz: Annotated[float, Query(gt=0, le=1000)] = _USUAL_RATE_HZ,
 ) -> TriedOut:
-    """Recorded MOTChallenge tracks, thinned, to try a form with; nothing is stored."""
+    """Return recorded tracks of a text table, thinned, to try a form with; nothing is stored."""
     clock = Clock(frame_rate_hz=frame_rate_hz, started_at_s=_AN_EPOCH_S)
     limits = Limits(width=width, height=height, now_s=_AN_EPOCH_S, max_ahead_s=_A_RECORDING_S)
-    batch = read_mot(body, "tried", clock, limits)
+    batch = read_text(body, "tried", clock, limits)
     some = batch.tracks[:: max(-(-len(batch.tracks) // _MOST_TRACKS), 1)]
     thinned = []
     for track in some:
@@ -187,8 +188,8 @@ def tracks(
     text = _n("{n} track read", "{n} tracks read", len(batch.tracks))
     if len(some) < len(batch.tracks):
         text += _(", {n} of them shown", n=len(some))
-    if batch.left_out:
-        text += _n("; {n} line is of no person", "; {n} lines are of no person", batch.left_out)
+    for reason, count in batch.skipped.items():
+        text += f"; {skipped_words(reason, count)}"
     if batch.rejections:
         first = batch.rejections[0]
         text += _(

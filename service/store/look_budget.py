@@ -27,14 +27,14 @@ class TrackSize(NamedTuple):
 
 
 class LookBudget:
-    """The budget of one look, or a `share` of it; `left_out` are the names of tracks by number.
+    """The budget of one look, or a `share` of it; `skipped` are the names of tracks by number.
 
     Each reading of tracks may spend all of it.
     """
 
     def __init__(self, share: float = 1.0) -> None:
         self.share = share
-        self.left_out: dict[int, str] = {}
+        self.skipped: dict[int, str] = {}
 
     def leave_out(self, sizes: Sequence[TrackSize]) -> list[int]:
         """The fewest tracks to be left out, the largest first, for the others to be in budget."""
@@ -46,7 +46,7 @@ class LookBudget:
                 break
             total -= cost
             found.append(size.id)
-            self.left_out[size.id] = size.track_id
+            self.skipped[size.id] = size.track_id
         return found
 
 

@@ -103,9 +103,9 @@ def by_end(
 
     columns: Sequence[SQLColumnExpression[Any]] = _COLUMNS
     if budget is not None:
-        left_out = budget.leave_out([TrackSize._make(row) for row in rows(_SIZE_COLUMNS)])
-        if left_out:
-            columns = [_only_last(column, left_out) for column in _COLUMNS]
+        skipped = budget.leave_out([TrackSize._make(row) for row in rows(_SIZE_COLUMNS)])
+        if skipped:
+            columns = [_only_last(column, skipped) for column in _COLUMNS]
     return [StoredTrack._make(row) for row in rows(columns)]
 
 

@@ -3,6 +3,7 @@
 from models.durations import HOUR_S
 from service.wording.language import N_, _, _n, number
 from service.wording.times import duration
+from surefoot.people import SkipReason
 
 _SOON_S = 60.0  # after a track's end: portions and networks take as long
 _ZONES_H, _NEAR_ZONE_S = 14, 120.0
@@ -29,10 +30,31 @@ _MENDS = {
     "gap": N_("The tracker gives a name to somebody else: end a track that is not seen any more."),
     "too_long": N_("The frame rate is wrong, or a track is of several people."),
     "unsupported_media_type": N_(
-        "Content-Type has to say what is posted: application/json, application/x-ndjson or "
-        "text/csv."
+        "Set the Content-Type header to the form of the body: application/json, "
+        "application/x-ndjson or text/csv."
     ),
 }
+
+_SKIPPED = {
+    SkipReason.NOT_A_PERSON: (
+        N_("{n} track skipped: not a person"),
+        N_("{n} tracks skipped: not a person"),
+    ),
+    SkipReason.CONFIDENCE: (
+        N_("{n} track skipped: confidence 0"),
+        N_("{n} tracks skipped: confidence 0"),
+    ),
+    SkipReason.NO_ID: (
+        N_("{n} track skipped: no track id"),
+        N_("{n} tracks skipped: no track id"),
+    ),
+}
+
+
+def skipped_words(reason: SkipReason, count: int) -> str:
+    """Return how many tracks were skipped for a reason."""
+    one, many = _SKIPPED[reason]
+    return _(one if count == 1 else many, n=count)
 
 
 def mends_words(code: str) -> str:

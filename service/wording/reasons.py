@@ -269,7 +269,7 @@ def _other_sources(v: _Values) -> str:
     )
 
 
-def _left_out(v: _Values) -> str:
+def _tracks_skipped(v: _Values) -> str:
     names = ", ".join(repr(name) for name in v["track_ids"])
     if v["tracks"] > len(v["track_ids"]):
         names += _(" and others")
@@ -393,7 +393,7 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         waits=v["waits_s"] / 60,
         limit=v["limit_s"] / 60,
     ),
-    ServiceCode.TRACKS_LEFT_OUT: _left_out,
+    ServiceCode.TRACKS_SKIPPED: _tracks_skipped,
     ServiceCode.BRIDGE_SILENT: lambda v: _(
         "the MQTT bridge {bridge} has not reported for {minutes:.0f} min: tracks that it carries "
         "do not arrive",

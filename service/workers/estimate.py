@@ -13,8 +13,8 @@ from service.estimate_queue import (
     end_look,
     fail_look,
     leave_poisoned,
-    left_out_by,
     note_partial_failures,
+    skipped_by,
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
 from service.estimation.compute import ComputedEstimate, compute_estimate
@@ -81,7 +81,7 @@ def _look(
     if propose_if_uncalibrated(context, camera_id, unpacked):
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=left_out_by(budget))
+            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
         return
     failures.unless_failed("picture", partial(compare_if_due, context, camera_id))
     missing = predict_pending(context, camera_id, unpacked)
@@ -91,9 +91,9 @@ def _look(
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked, asked=asked)
-    if left_out := left_out_by(budget):
-        log.warning("tracks_left_out", extra={"camera_id": camera_id, **left_out[0].values})
-        failures.reasons.extend(left_out)
+    if skipped := skipped_by(budget):
+        log.warning("tracks_skipped", extra={"camera_id": camera_id, **skipped[0].values})
+        failures.reasons.extend(skipped)
     found = None if evidence is None else compute_estimate(evidence, settings.seed, failures)
     with store.write(camera_id) as session:
         if evidence is not None and isinstance(found, ComputedEstimate):

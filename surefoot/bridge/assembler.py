@@ -15,9 +15,11 @@ from typing import Any
 import msgspec
 
 from surefoot.bridge.values import Detection, Ended, WholeTrack
+from surefoot.people import SkipReason, skip_reason
 
 _VERSION = 2
 _COLUMNS = 5  # time and box
+_RANKS = {None: 0, SkipReason.CONFIDENCE: 1, SkipReason.NOT_A_PERSON: 2}
 
 
 class StateError(Exception):
@@ -33,6 +35,7 @@ class _Open(msgspec.Struct, array_like=True):
     rows: Any  # array of floats; bytes where saved
     first_s: float = math.inf  # messages come out of turn
     last_s: float = -math.inf
+    confidence: float | None = None
 
 
 class _State(msgspec.Struct, array_like=True):
@@ -136,16 +139,32 @@ class Assembler:
             track = None
         if track is None:
             track = _Open(found.camera, found.track_id, found.label, found.size, now_s, array("d"))
+            track.confidence = found.confidence
         else:
             del self._open[key]  # to the end: heard of last
         self._open[key] = track
         track.heard_s = now_s
+        if track.rows and not self._is_used(track, found):
+            return
         track.rows.extend((found.time_s, *found.box))
         track.first_s = min(track.first_s, found.time_s)
         track.last_s = max(track.last_s, found.time_s)
         self._open_points += 1
         while len(self._open) > self.max_tracks or self._open_points > self.max_points:
             self._finish(next(iter(self._open)))
+
+    def _is_used(self, track: _Open, found: Detection) -> bool:
+        """Return False for a detection to leave out of a track that has better ones.
+
+        A detector may change its mind: a track keeps the detections of a person that are to be
+        used, and has others only while it has none of those. A table of text is read the same way.
+        """
+        has, comes = _rank(track.label, track.confidence), _rank(found.label, found.confidence)
+        if comes < has:
+            self._open_points -= len(track.rows) // _COLUMNS
+            track.label, track.confidence, track.rows = found.label, found.confidence, array("d")
+            track.first_s, track.last_s = math.inf, -math.inf
+        return comes <= has
 
     def _is_another(self, track: _Open, found: Detection) -> bool:
         """True where a known id is of somebody else, or seen in another picture, by now."""
@@ -168,7 +187,13 @@ class Assembler:
         self._done[key] = (rows[0], rows[-_COLUMNS])
         if len(self._done) > self.max_tracks:
             del self._done[next(iter(self._done))]
-        self._finished.append(WholeTrack(*key, track.label, "boxes", rows, track.size))
+        whole = WholeTrack(*key, track.label, "boxes", rows, track.size, track.confidence)
+        self._finished.append(whole)
+
+
+def _rank(label: str | None, confidence: float | None) -> int:
+    """Return 0 for a detection to be used, else how far it is from being one."""
+    return _RANKS[skip_reason(label, confidence)]
 
 
 def _in_order(rows: array[float]) -> array[float]:

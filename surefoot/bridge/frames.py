@@ -9,25 +9,28 @@ from surefoot.bridge.values import (
     MessageError,
     SkippedRow,
     box_of,
+    confidence_of,
     each_row,
+    label_of,
     number,
     parsed_json,
+    seconds,
     table,
     text,
 )
 
 
 def read_frame(message: bytes, camera: str) -> list[Detection | Ended | SkippedRow]:
-    """The detections `{"id", "box": [x1, y1, x2, y2], "class"}` of a frame, and ids that ended.
+    """Return the detections `{"id", "box", "class"?, "confidence"?}` of a frame and ended ids.
 
-    Boxes are pixels of `size` [width, height], shares where `normalised` is true, else pixels of
-    the camera's own picture.
+    A box is [x1, y1, x2, y2] in pixels of `size` [width, height], in shares if `normalised` is
+    true, else in pixels of the camera's image. A class is a name or a COCO number.
 
     Raises:
         MessageError: the message is no frame.
     """
     frame = table(parsed_json(message), "frame")
-    time_s = number(frame.get("time_s"), "time_s")
+    time_s = seconds(frame.get("time_s"), "time_s")
     size: tuple[float, float] | None = None
     if frame.get("normalised") is True:
         size = NORMALISED
@@ -38,9 +41,10 @@ def read_frame(message: bytes, camera: str) -> list[Detection | Ended | SkippedR
     def detection(row: Any, where: str) -> Detection:
         seen = table(row, where)
         track_id = text(seen.get("id"), f"{where}/id")
-        label = None if seen.get("class") is None else text(seen["class"], f"{where}/class")
+        label = label_of(seen.get("class"), f"{where}/class")
         box = box_of(_numbers(seen.get("box"), 4, f"{where}/box"), f"{where}/box")
-        return Detection(camera, time_s, track_id, label, box, size)
+        ignored = confidence_of(seen.get("confidence"))
+        return Detection(camera, time_s, track_id, label, box, size, ignored)
 
     def ended(row: Any, where: str) -> Ended:
         return Ended(camera, text(row, where))

@@ -16,6 +16,7 @@ from surefoot.bridge.values import (
     each_row,
     text,
 )
+from surefoot.people import PEDESTRIANS
 
 PERSON = "person"
 CameraOf: TypeAlias = Callable[[str], str]  # our name of a camera of Frigate's
@@ -61,7 +62,7 @@ _read_data = msgspec.json.Decoder(_Data | None).decode
 
 
 def read_event(message: bytes, camera_of: CameraOf) -> WholeTrack | None:
-    """The path of a person whose event has ended; None of any other message, and of no foot.
+    """Return the path of a person whose event has ended; None for other messages and no path.
 
     Points are `[time_s, x, y]`, the bottom centre as a share of the picture.
 
@@ -74,7 +75,7 @@ def read_event(message: bytes, camera_of: CameraOf) -> WholeTrack | None:
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise MessageError("malformed", f"no event of Frigate's: {error}") from error
     after = event.after
-    if event.type != "end" or after.label != PERSON or after.false_positive:
+    if event.type != "end" or after.false_positive or not PEDESTRIANS.include(after.label):
         return None
     return _track(after, after.path_data, camera_of, "after.")
 
@@ -106,7 +107,7 @@ def track_of(event: Stored, camera_of: CameraOf) -> WholeTrack | None:
     Raises:
         MessageError: it has none, as what was entered by hand, or is no path.
     """
-    if event.end_time is None or event.label != PERSON or event.false_positive:
+    if event.end_time is None or event.false_positive or not PEDESTRIANS.include(event.label):
         return None
     check_json(bytes(event.data))
     try:

@@ -32,6 +32,7 @@ class Posting:
     tally: Tally
     _backlog: Backlog = field(default_factory=Backlog)
     _held: dict[int, tuple[float, float]] = field(default_factory=dict)  # again at, then after, s
+    _logged: set[tuple[str, str]] = field(default_factory=set)
 
     def run(self, stopping: threading.Event) -> None:
         """Post what the spool has until the event is set."""
@@ -81,6 +82,7 @@ class Posting:
             self.tally.posted(group.camera, receipt["accepted"])
             self.tally.count("tracks_rejected", len(receipt["rejected"]))
             _tell_rejected(group.camera, receipt["rejected"])
+            self._note_skipped(group.camera, receipt)
         except RefusedError as error:
             unknown = error.status == _NOT_FOUND
             self.tally.count("tracks_rejected", len(group.tracks))
@@ -105,6 +107,18 @@ class Posting:
             extra = {"tracks": dropped.total(), "cameras": len(dropped), "first": min(dropped)}
             log.warning("tracks_dropped", extra=extra)
             self.tally.count("tracks_rejected", dropped.total())
+
+    def _note_skipped(self, camera: str, receipt: dict[str, Any]) -> None:
+        """Count the tracks that the service skipped; log a reason once for each camera."""
+        for reason, tracks in receipt.get("skipped", {}).items():
+            self.tally.count("tracks_skipped", tracks)
+            if (camera, reason) in self._logged:
+                continue
+            if len(self._logged) >= MOST_HELD:
+                self._logged.clear()
+            self._logged.add((camera, reason))
+            extra = {"camera_id": camera, "reason": reason, "tracks": tracks}
+            log.info("posted_tracks_skipped", extra=extra)
 
     def _hold(self, group: Group, now_s: float) -> None:
         for number in group.tracks:

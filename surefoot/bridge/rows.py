@@ -14,15 +14,16 @@ from surefoot.bridge.values import (
     SkippedRow,
     check_json,
     check_size,
+    confidence_of,
     each_row,
     number,
     parsed_json,
     table,
     text,
 )
+from surefoot.people import PEDESTRIANS
 
 MAX_FILE_BYTES = 16 * 1024 * 1024  # 80,000 rows or so; JSON is built as a whole
-_COCO_PERSON = 0
 
 
 class Clock(NamedTuple):
@@ -89,7 +90,9 @@ def read_ultralytics_text(lines: bytes, camera: str, time_s: float) -> list[Dete
         if len(cells) == 5 or not cells[-1].isdecimal():
             return None
         box = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
-        return Detection(camera, time_s, text(cells[-1], where), _label(kind), box, NORMALISED)
+        track_id = text(cells[-1], where)
+        ignored = confidence_of(cells[5]) if len(cells) == 7 else None
+        return Detection(camera, time_s, track_id, _label(kind), box, NORMALISED, ignored)
 
     rows = lines.decode("utf-8", errors="replace").splitlines()
     return list(each_row(rows, "lines", detection))
@@ -112,7 +115,8 @@ def read_ultralytics_summary(
         names = ("x1", "y1", "x2", "y2")
         x1, y1, x2, y2 = (number(edges.get(name), f"{where}/box/{name}") for name in names)
         label, track_id = text(row.get("name"), f"{where}/name"), text(row["track_id"], where)
-        return Detection(camera, time_s, track_id, label, (x1, y1, x2, y2), size)
+        ignored, box = confidence_of(row.get("confidence")), (x1, y1, x2, y2)
+        return Detection(camera, time_s, track_id, label, box, size, ignored)
 
     return list(each_row(parsed_json(message), "rows", detection))
 
@@ -140,11 +144,12 @@ def _supervision(
             label=text(named, f"{where}/class_name") if named else label,
             box=(x1, y1, x2, y2),
             size=size,
+            confidence=confidence_of(row.get("confidence")),
         )
 
     return each_row(rows, "rows", detection)
 
 
 def _label(kind: float) -> str:
-    """A class by its number, as models that were trained on COCO have them."""
-    return "person" if kind == _COCO_PERSON else f"class {kind:g}"
+    """Return the name of a class number, as models that were trained on COCO have them."""
+    return "person" if PEDESTRIANS.include(kind) else f"class {kind:g}"

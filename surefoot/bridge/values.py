@@ -9,6 +9,8 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 import msgspec
 
 from surefoot.nesting import MAX_LEVELS, json_levels
+from surefoot.people import PEDESTRIANS, is_ignored
+from surefoot.times import LAST_S, not_seconds
 
 Box: TypeAlias = tuple[float, float, float, float]
 
@@ -36,7 +38,8 @@ class Detection(msgspec.Struct, frozen=True, array_like=True, tag="seen"):
 
     `size` is (width, height) in pixels that count from 0 at the centre of the first, `NORMALISED`
     where numbers are shares of the picture, None where the source does not say. `time_s` is since
-    the Unix epoch by the source's clock.
+    the Unix epoch by the source's clock. `label` is the class, a name or a number as text.
+    `confidence` 0 marks a detection to be ignored.
     """
 
     camera: str
@@ -45,6 +48,7 @@ class Detection(msgspec.Struct, frozen=True, array_like=True, tag="seen"):
     label: str | None
     box: Box
     size: tuple[float, float] | None
+    confidence: float | None = None
 
 
 class Ended(msgspec.Struct, frozen=True, array_like=True, tag="ended"):
@@ -65,6 +69,8 @@ class WholeTrack(NamedTuple):
     """A track from its first to its last point, ready to be posted.
 
     `rows` are flat, row after row: of `points` time, u, v of the foot; of `boxes` time and box.
+    Tracks of other classes, and those with `confidence` 0, are posted as well: the service decides
+    by the same rule for every source, and counts what it skips.
     """
 
     camera: str
@@ -73,6 +79,7 @@ class WholeTrack(NamedTuple):
     form: str
     rows: "array[float]"
     size: tuple[float, float] | None
+    confidence: float | None = None
 
     @property
     def columns(self) -> int:
@@ -80,11 +87,15 @@ class WholeTrack(NamedTuple):
         return 5 if self.form == "boxes" else 3
 
     def to_json(self) -> bytes:
-        """The track as it stands in a body of `POST /cameras/{id}/tracks`."""
+        """Return the track as in a body of `POST /cameras/{id}/tracks`."""
         step = self.columns
         rows = [self.rows[at : at + step].tolist() for at in range(0, len(self.rows), step)]
         track: dict[str, Any] = {"id": self.track_id, self.form: rows}
-        return msgspec.json.encode(track if self.label is None else track | {"class": self.label})
+        if self.label is not None:
+            track["class"] = self.label
+        if self.confidence is not None:
+            track["confidence"] = self.confidence
+        return msgspec.json.encode(track)
 
     def head(self, source: str) -> bytes:
         """What a body says of all its tracks, as JSON: tracks of one head go in one post."""
@@ -122,6 +133,26 @@ def number(value: Any, what: str) -> float:
     return found
 
 
+def label_of(value: Any, what: str) -> str | None:
+    """Return the class of a detection as text, None if the source gives none.
+
+    A number that means a person, as the service reads it, becomes `person`.
+
+    Raises:
+        MessageError: it is neither text nor a number.
+    """
+    if value is None or isinstance(value, str) and not value.strip():
+        return None
+    label = f"{value:g}" if isinstance(value, float) else text(value, what)
+    is_number = label.strip().lstrip("-").replace(".", "", 1).isdecimal()
+    return "person" if is_number and PEDESTRIANS.include(label) else label
+
+
+def confidence_of(value: Any) -> float | None:
+    """Return 0 for a detection that is marked to be ignored, None for any other."""
+    return 0.0 if is_ignored(value) else None
+
+
 def text(value: Any, what: str) -> str:
     """A name or an id of a message, as text.
 
@@ -139,6 +170,21 @@ def text(value: Any, what: str) -> str:
             f"{what}: 1 to {MAX_TEXT} characters are needed, got {len(found)}: {found!r:.40}",
         )
     return found
+
+
+def seconds(value: Any, what: str) -> float:
+    """Return a time in seconds since the Unix epoch.
+
+    Raises:
+        MessageError: it is no number, or looks like milliseconds.
+    """
+    try:
+        found = float(value)
+    except (TypeError, ValueError, OverflowError):
+        found = math.nan
+    if LAST_S < found < math.inf:
+        raise MessageError("malformed", f"{what}: {not_seconds(found)}")
+    return number(value, what)
 
 
 def moment(value: Any, what: str) -> float:

@@ -160,7 +160,7 @@ def _words(cost: Cost) -> str:
     ended = "" if cost.error is None else f", {cost.error}"
     return (
         f"{cost.cpu_s:6.2f} CPU-s {cost.peak_mb:5.0f} MB, {cost.tracks} tracks of {cost.points} "
-        f"points, {cost.left_out} left out{ended}: {crowds}"
+        f"points, {cost.skipped} skipped{ended}: {crowds}"
     )
 
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from service.errors import ServiceError
 from service.formats.batch import read_json, read_ndjson
-from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
+from service.formats.track_text import read_text
 from service.workers.processes.process import settle_allocator
 
 MB = 2**20
@@ -161,7 +161,7 @@ def _read(kind: str, body: bytes) -> str:
             case "ndjson":
                 batch = read_ndjson(body, "drawn", _CLOCK, _LIMITS)
             case _:
-                batch = read_mot(body, "drawn", _CLOCK, _LIMITS)
+                batch = read_text(body, "drawn", _CLOCK, _LIMITS)
     except ServiceError as error:
         return error.code
     return f"{len(batch.tracks)} taken, {len(batch.rejections)} rejected"

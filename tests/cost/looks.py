@@ -33,7 +33,7 @@ LOOK_CPU_S, LOOK_MB = 40.0, 500.0  # of a look: reference, pose and map; and bes
 class Cost:
     """The cost of a look at tracks of so many points: CPU seconds, and memory beyond that before.
 
-    `left_out` is how many tracks it had no budget for; `error` is how it ended, if by one.
+    `skipped` is how many tracks it had no budget for; `error` is how it ended, if by one.
     """
 
     crowds: tuple[Crowd, ...]
@@ -41,7 +41,7 @@ class Cost:
     points: int
     cpu_s: float
     peak_mb: float
-    left_out: int
+    skipped: int
     error: str | None
 
 
@@ -90,7 +90,7 @@ class Looker:
         cpu_s, peak_mb = time.process_time() - before_s, _peak_mb() - before_mb
         with self._context.store.write(camera_id) as session:
             camera = session.get_one(CameraRecord, camera_id)
-            left_out = [lack.values for lack in camera.lacks if "track_ids" in lack.values]
+            skipped = [lack.values for lack in camera.lacks if "track_ids" in lack.values]
             session.delete(camera)
         return Cost(
             crowds=tuple(crowds),
@@ -98,7 +98,7 @@ class Looker:
             points=points,
             cpu_s=cpu_s,
             peak_mb=peak_mb,
-            left_out=int(str(left_out[0]["tracks"])) if left_out else 0,
+            skipped=int(str(skipped[0]["tracks"])) if skipped else 0,
             error=error,
         )
 

@@ -331,3 +331,15 @@ def test_supervisions_detections_are_taken_as_they_are(soon, tmp_path):
     assert {track["id"]: track["boxes"][0] for track in body["tracks"]} == {
         "3": [100.0, 1, 2, 3, 4], "4": [100.0, 5, 6, 7, 8],
     }  # fmt: skip
+
+
+def test_client_posts_the_class_of_most_detections_and_counts_what_is_skipped(server, soon):
+    start_s = time.time() - 60
+    with Client(server.url, "corner") as client:
+        for n in range(10):
+            box = (150 + n, 100, 180 + n, 200)
+            for name, label in (("a", "person"), ("b", 2), ("c", 0.0), ("d", None)):
+                client.add(name, box, start_s + 0.4 * n, label="car" if n == 4 else label)
+    assert client.posted == Counter(accepted=3, skipped=1)
+    assert client.skipped == Counter(not_a_person=1)
+    assert [name for _, name, *_ in stored(server)] == ["a", "c", "d"]

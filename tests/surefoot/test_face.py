@@ -151,7 +151,7 @@ def test_tracks_are_read_of_mot_text_and_of_feet(tmp_path):
     np.testing.assert_allclose(track.time_s, 1000 + 0.4 * np.arange(6))
     np.testing.assert_allclose(track.uv[0], [100 - 1 + 10.5, 50 - 1 + 80])  # they count from 1
     assert track.top_v[0] == 49
-    with pytest.raises(surefoot.CalibrationError, match="frame_rate_hz is needed"):
+    with pytest.raises(surefoot.CalibrationError, match="frame_rate_hz: is needed"):
         surefoot.read_tracks(mot)
     feet = tmp_path / "feet.csv"
     lines = [f"7,{time_s},{u},{v}" for time_s, (u, v) in zip(track.time_s, track.uv, strict=True)]
@@ -159,7 +159,7 @@ def test_tracks_are_read_of_mot_text_and_of_feet(tmp_path):
     (same,) = surefoot.read_tracks(feet)
     np.testing.assert_allclose(same.uv, track.uv)
     feet.write_text("nothing of the kind")
-    with pytest.raises(surefoot.CalibrationError, match="neither MOTChallenge text nor CSV"):
+    with pytest.raises(surefoot.CalibrationError, match="header: missing id"):
         surefoot.read_tracks(feet, frame_rate_hz=25)
 
 
@@ -242,8 +242,9 @@ def test_what_is_no_camera_is_said_by_an_error_of_ours(tmp_path, wrong):
 def test_tracks_and_sites_that_are_none_are_said_by_errors_of_ours(camera, tmp_path):
     feet = tmp_path / "feet.csv"
     feet.write_text("track_id,time_s,u_px,v_px\na,0.0,100,200\na,0.5,108\n")
-    with pytest.raises(surefoot.CalibrationError, match="neither MOTChallenge text nor CSV"):
-        surefoot.read_tracks(feet)
+    assert surefoot.read_tracks(feet).rejected == {"malformed": 1}
+    with pytest.raises(surefoot.CalibrationError, match="none.csv: No such file"):
+        surefoot.read_tracks(tmp_path / "none.csv")
     with zipfile.ZipFile(tmp_path / "bare.site", "w") as file:
         file.writestr("camera.json", camera.as_json())
     with pytest.raises(surefoot.CalibrationError, match="bare.site: no site of ours"):

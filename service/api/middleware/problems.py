@@ -2,7 +2,6 @@
 
 import json
 import logging
-import reprlib
 from http import HTTPStatus
 from typing import Any
 
@@ -17,6 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from models.errors import CalibrationError
 from service.api.middleware import pages
+from service.api.middleware.field_errors import field_errors
 from service.errors import FieldError, ServiceError
 from service.store.engines.failures import failure_of
 from service.wording.language import N_, _
@@ -35,7 +35,6 @@ FORESEEN = (
 _OF_ALL = {"X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin"}
 # The default of every route: no browser and no proxy stores the answer.
 _NOT_STORED = "no-store"
-_HIDDEN = ("snapshot_credentials", "password", "token")  # fields that no answer repeats
 # What a person can do about what a program reads in the detail.
 _FOR_PEOPLE = {
     403: N_(
@@ -49,8 +48,6 @@ _TITLES = {
     503: N_("The service is busy"),
 }  # of pages
 _MOST_ERRORS = 20  # of one body
-_BRIEF = reprlib.Repr()
-_BRIEF.maxstring = 80
 
 
 class ProblemMiddleware:
@@ -154,22 +151,9 @@ def _told(request: Request, error: Exception) -> ServiceError:
 
 
 def _malformed(error: RequestValidationError) -> ServiceError:
-    errors = tuple(
-        FieldError(
-            pointer="".join(f"/{part}" for part in item["loc"] if part != "body")[:200],
-            reason=item["msg"] + _got(item),
-        )
-        for item in error.errors()[:_MOST_ERRORS]
-    )
+    errors = field_errors(error.errors()[:_MOST_ERRORS])
     detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
     return _other(422, "malformed", detail, errors)
-
-
-def _got(item: dict[str, Any]) -> str:
-    """The value that was received, unless its field is secret."""
-    if any(part in _HIDDEN for part in item["loc"]):
-        return ""
-    return f", got {_BRIEF.repr(item.get('input')):.80}"
 
 
 def _other(

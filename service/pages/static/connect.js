@@ -13,7 +13,14 @@ const TYPES = {
   ndjson: "application/x-ndjson",
   jsonl: "application/x-ndjson",
   csv: "text/csv",
+  tsv: "text/csv",
   txt: "text/csv",
+};
+/** What is shown for each reason to skip tracks. */
+const SKIPPED = {
+  not_a_person: (n) => _("{n} skipped: not a person", { n }),
+  ignored_by_confidence: (n) => _("{n} skipped: confidence 0", { n }),
+  no_track_id: (n) => _("{n} skipped: no track id", { n }),
 };
 
 let token = null;
@@ -89,22 +96,27 @@ function addressOf(type) {
     const rate = document.getElementById("rate").value.trim().replace(",", ".");
     if (began) query.set("started_at", new Date(began).toISOString());
     if (rate) query.set("frame_rate_hz", rate);
+    for (const name of ["layout", "classes"]) {
+      const typed = document.getElementById(name).value.trim();
+      if (typed) query.set(name, typed);
+    }
   }
   return panel.dataset.tracks + (query.size ? `?${query}` : "");
 }
 
 async function post(file) {
   const type = TYPES[file.name.split(".").at(-1).toLowerCase()];
-  if (!type) throw refused(_("{name}: a file that ends in .json, .ndjson, .csv or .txt is needed.", { name: file.name }));
+  if (!type) throw refused(_("{name}: a file that ends in .json, .ndjson, .csv, .tsv or .txt is needed.", { name: file.name }));
   if (panel.dataset.posts === "no" && !token) {
     throw refused(_("Who is logged in here may not post tracks: make a token first, or use a command."));
   }
   says.textContent = _("Posting {name}…", { name: file.name });
   const headers = { "Content-Type": type, ...(token && { Authorization: `Bearer ${token}` }) };
-  const { accepted, duplicates, rejected, left_out } = await call("POST", addressOf(type), file, headers);
+  const answer = await call("POST", addressOf(type), file, headers);
+  const { accepted, duplicates, rejected, skipped = {} } = answer;
   const counts = { taken: accepted, known: duplicates, refused: rejected.length };
   const parts = [_("{taken} taken, {known} known before, {refused} refused", counts)];
-  if (left_out) parts.push(_("{n} of no person left out", { n: left_out }));
+  for (const [reason, n] of Object.entries(skipped)) parts.push(SKIPPED[reason]?.(n) ?? `${n} ${reason}`);
   says.textContent = `${file.name}: ${parts.join(", ")}.`;
 }
 

@@ -55,7 +55,7 @@ def spoil(street, **values):
         session.execute(update(CameraRecord).values(**values))
 
 
-def test_the_largest_are_left_out_and_no_more_of_them_than_need_be():
+def test_the_largest_are_skipped_and_no_more_of_them_than_need_be():
     def size(number, duration_s, points=500, stored=12_000):
         return TrackSize(number, f"t{number}", duration_s, points, stored)
 
@@ -64,7 +64,7 @@ def test_the_largest_are_left_out_and_no_more_of_them_than_need_be():
     budget = LookBudget()
     assert budget.leave_out(honest) == []
     assert budget.leave_out([*honest, *lingering]) == [508]
-    assert budget.left_out == {n: f"t{n}" for n in (508,)}
+    assert budget.skipped == {n: f"t{n}" for n in (508,)}
     large = [size(1, 30.0, 10_000, 80_000_000), size(2, 30.0, 10_000, 40_000_000)]
     assert LookBudget().leave_out(large) == [1]
     assert LookBudget(0.25).leave_out(large) == [1, 2]
@@ -96,7 +96,7 @@ def test_a_camera_beside_whom_people_linger_sees_a_knock_and_names_them(street, 
     assert "7 of its tracks are not looked at" in body["reason"]
     assert watch(street) == {"corner": "opened"}
     (alert,) = (each for each in street.alerts() if each["kind"] == "stale")
-    assert (alert["severity"], alert["reason_code"]) == ("warning", "tracks_left_out")
+    assert (alert["severity"], alert["reason_code"]) == ("warning", "tracks_skipped")
     assert "'lingers 0', 'lingers 1'" in alert["reason"]
     assert watch(street) == {}
     # Then the looks fail, too: the same alert, and critical.

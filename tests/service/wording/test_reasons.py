@@ -165,10 +165,10 @@ SAID = [
      "its tracks cannot be looked at: 3 tries failed in a row, the last with KeyError('x')"),
     (S.TRACKS_WAIT, {"waits_s": 1230.0, "limit_s": 900.0},
      "its tracks have waited for 20 min; up to 15 min are waited for"),
-    (S.TRACKS_LEFT_OUT, {"tracks": 7, "track_ids": ["17", "it's"], "share": 1.0},
+    (S.TRACKS_SKIPPED, {"tracks": 7, "track_ids": ["17", "it's"], "share": 1.0},
      "7 of its tracks are not looked at, for a look would take too long of them: '17', \"it's\" "
      "and others"),
-    (S.TRACKS_LEFT_OUT, {"tracks": 1, "track_ids": ["17"], "share": 0.25},
+    (S.TRACKS_SKIPPED, {"tracks": 1, "track_ids": ["17"], "share": 0.25},
      "1 of its tracks is not looked at, for a look would take too long of it: '17'"),
     (S.DISABLED_BY_PERSON, {}, "disabled by a person"),
     (S.ENDPOINT_GONE, {}, "it answered 410: it is gone for good"),

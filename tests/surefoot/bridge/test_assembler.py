@@ -2,6 +2,7 @@
 
 import json
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -185,3 +186,32 @@ def test_who_stays_for_hours_is_some_tracks_that_the_service_takes():
     tracks = assembler.take()
     assert sum(len(track.rows) // 5 for track in tracks) == 7_500
     assert [track.rows[-5] - track.rows[0] for track in tracks] == [3_600, 3_600, 297]
+
+
+def test_track_keeps_the_detections_of_a_person_only():
+    assembler = Assembler()
+    labels = ["car", "person", "person", "car", "Person", None, "person", "7"]
+    for n, label in enumerate(labels):
+        assembler.add(seen(at=0.5 * n, label=label), T0 + 0.5 * n)
+    walk(assembler, "bus", label="bus")
+    assembler.finish_all()
+    person, bus = assembler.take()
+    assert person.label == "person"
+    assert [row - T0 for row in person.rows[::5]] == [0.5, 1.0, 2.0, 2.5, 3.0]
+    assert (bus.label, len(bus.rows) // 5) == ("bus", 6)
+
+
+def test_detections_with_confidence_0_give_way_to_others_and_are_marked_alone():
+    assembler = Assembler()
+    for n, confidence in enumerate((0.0, 0.0, None, 0.0, None)):
+        for track_id, value in (("a", confidence), ("b", 0.0)):
+            found = seen(track_id, at=0.5 * n)
+            assembler.add(msgspec.structs.replace(found, confidence=value), T0 + 0.5 * n)
+    again = Assembler()
+    again.restore(assembler.state())
+    again.finish_all()
+    a, b = again.take()
+    assert (a.confidence, len(a.rows) // 5) == (None, 2)
+    assert (b.confidence, len(b.rows) // 5) == (0.0, 5)
+    assert b'"confidence":0' in b.to_json()
+    assert again._open_points == 0

@@ -16,8 +16,8 @@ from models.simulation.walkers import WalkConfig
 from models.tracks.scenes import load_scene
 from models.tracks.trajectory import Trajectory, by_end
 from service.formats.batch import read_json
-from service.formats.mot import read_mot
 from service.formats.track import Clock, Limits
+from service.formats.track_text import read_text
 from surefoot import client
 from surefoot.bridge import rows
 from surefoot.bridge.assembler import Assembler
@@ -268,7 +268,7 @@ def test_a_pose_by_mot_rows_is_the_pose_of_the_tracks(scene, frames, direct):
             lines.append(f"{frame},{name},{numbers},0.9,-1,-1,-1")
 
     def read(body, clock, limits):
-        return read_mot(body, "x", clock, limits)
+        return read_text(body, "x", clock, limits)
 
     clock = Clock(frame_rate_hz=rate_hz, started_at_s=T0)
     check_same(direct, tracks_in(scene, "\n".join(lines).encode(), read, clock))

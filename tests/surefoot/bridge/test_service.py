@@ -1,10 +1,14 @@
 """The service as it is asked: lists to their end, and answers that cannot be read are for later."""
 
+from types import SimpleNamespace
+
 import httpx
 import pytest
 
 from surefoot.bridge import service as module
 from surefoot.bridge.service import LaterError, Service
+from surefoot.bridge.spool import Group
+from tests.surefoot.bridge.halves import posting_of
 
 
 def asking(monkeypatch, answer):
@@ -41,3 +45,17 @@ def test_an_answer_that_a_proxy_has_broken_is_asked_for_again(monkeypatch):
         service.get("/cameras")
     with pytest.raises(LaterError, match="DecodingError"):
         list(service.events(None))
+
+
+def test_skipped_tracks_are_counted_and_a_reason_is_logged_once_a_camera(monkeypatch, caplog):
+    caplog.set_level("INFO", "surefoot.bridge")
+    receipt = {"accepted": 0, "duplicates": 0, "rejected": [], "skipped": {"not_a_person": 2}}
+    service = asking(monkeypatch, lambda _: httpx.Response(202, json=receipt))
+    dropped = []
+    posting = posting_of(SimpleNamespace(drop=dropped.append), service)
+    for camera in ("yard", "yard", "gate"):
+        posting._post(Group(camera, b'{"source":"frames"}', {1: b"{}"}))
+    assert posting.tally.report()["counts"]["tracks_skipped"] == 6
+    logged = [(each.camera_id, each.reason, each.tracks) for each in caplog.records]
+    assert logged == [("yard", "not_a_person", 2), ("gate", "not_a_person", 2)]
+    assert len(dropped) == 3
