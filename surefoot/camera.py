@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.lens_checks import check_lens
 from models.geometry.lens_forms import lens_of
 from models.geometry.pose import CameraPose
 
@@ -91,6 +92,7 @@ def camera_of(body: dict[str, Any]) -> Camera:
         raise ShapeError("intrinsics, lens: one of both is needed")
     try:
         lens = lens_of(**body["lens"]) if "lens" in body else Intrinsics(**body["intrinsics"])
+        check_lens(lens)
         camera = Camera(intrinsics=lens, prior_pose=Pose(**prior))
         _ = camera.prior_pose.in_radians  # refuses what no camera can have
     except (KeyError, TypeError, AttributeError, ZeroDivisionError) as error:

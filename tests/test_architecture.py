@@ -55,6 +55,7 @@ PUBLIC_MODELS = {
     "models.geometry.ground": "feet, horizons and people who are placed wrong",
     "models.geometry.hints": "what a person marks in a picture",
     "models.geometry.intrinsics": "the lens",
+    "models.geometry.lens_checks": "lenses that no camera has, and likely mistakes",
     "models.geometry.lens_forms": "the lens as installers know it",
     "models.geometry.outlines": "zones after a move",
     "models.geometry.pose": "the pose, its parameters and their names",

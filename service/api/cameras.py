@@ -17,6 +17,7 @@ from service.api.schemas import (
     CameraId,
     Finite,
     IntrinsicsBody,
+    IntrinsicsOut,
     LensBody,
     Out,
     PoseOut,
@@ -63,7 +64,7 @@ class _LensedBody(Body):
 
     def lens_value(self) -> Intrinsics | None:
         """The lens in pixels; None where neither form is given."""
-        body = self.intrinsics if self.lens is None else self.lens.to_intrinsics()
+        body = self.lens or self.intrinsics
         return None if body is None else body.to_value()
 
 
@@ -145,7 +146,7 @@ class CameraOut(Out):
     name: str
     site: str | None
     tags: list[str]
-    intrinsics: IntrinsicsBody
+    intrinsics: IntrinsicsOut
     prior_pose: PoseOut | None
     frame_rate_hz: float | None
     walking_speed: WalkingSpeedBody
@@ -165,7 +166,7 @@ class CameraOut(Out):
         record = view.record
         return cls.of(
             record,
-            intrinsics=IntrinsicsBody.model_validate(asdict(view.intrinsics)),
+            intrinsics=IntrinsicsOut.model_validate(asdict(view.intrinsics)),
             prior_pose=PoseOut.from_value(view.prior_pose) if view.calibrated else None,
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps

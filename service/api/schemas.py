@@ -22,6 +22,7 @@ from pydantic import (
 
 from models.errors import CalibrationError
 from models.geometry.intrinsics import Intrinsics, Projection, coefficients_of
+from models.geometry.lens_checks import check_lens
 from models.geometry.lens_forms import lens_of
 from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrices
 from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
@@ -118,7 +119,7 @@ class Out(BaseModel):
         return cls.model_validate({**own, **others})
 
 
-class IntrinsicsBody(Body):
+class IntrinsicsOut(Body):
     """Intrinsics in pixels; distortion k1, k2, p1, p2, k3, or of a fisheye k1, k2, k3, k4."""
 
     width: PictureSide
@@ -129,10 +130,18 @@ class IntrinsicsBody(Body):
     cy: Centre
     projection: Projection = Projection.PERSPECTIVE
     distortion: list[Coefficient] = Field(
-        default_factory=lambda said: [0.0] * len(coefficients_of(said["projection"])),
+        default_factory=lambda given: [0.0] * len(coefficients_of(given["projection"])),
         min_length=4,
         max_length=5,
     )
+
+
+class IntrinsicsBody(IntrinsicsOut):
+    """Intrinsics that a camera can have, in pixels.
+
+    The principal point (cx, cy) is within the image and the distortion does not fold back within
+    half of the image's shorter side from it.
+    """
 
     @field_validator("distortion")
     @classmethod
@@ -140,9 +149,14 @@ class IntrinsicsBody(Body):
         names = coefficients_of(info.data.get("projection", Projection.PERSPECTIVE))
         if len(value) != len(names):
             raise ValueError(
-                f"{len(names)} numbers, {', '.join(names)}, are needed, got {len(value)}"
+                f"must have {len(names)} numbers, {', '.join(names)} (got {len(value)})"
             )
         return value
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        check_lens(self.to_value())
+        return self
 
     def to_value(self) -> Intrinsics:
         """The lens as a value."""
@@ -175,12 +189,12 @@ class LensBody(Body):
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        _ = self.to_intrinsics()
+        check_lens(self.to_value())
         return self
 
-    def to_intrinsics(self) -> IntrinsicsBody:
+    def to_value(self) -> Intrinsics:
         """The lens in pixels."""
-        return IntrinsicsBody.model_validate(asdict(lens_of(**self.model_dump())))
+        return lens_of(**self.model_dump())
 
 
 _MEASURABLE = {"height_m", "tilt_deg", "roll_deg"}

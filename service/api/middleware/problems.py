@@ -2,7 +2,6 @@
 
 import json
 import logging
-import reprlib
 from http import HTTPStatus
 from typing import Any
 
@@ -19,6 +18,7 @@ from models.errors import CalibrationError
 from service.api.middleware import pages
 from service.errors import FieldError, ServiceError
 from service.store.engines.failures import failure_of
+from service.wording.body_errors import field_errors
 from service.wording.language import N_, _
 
 log = logging.getLogger("surefoot.http")
@@ -46,8 +46,6 @@ _TITLES = {
     503: N_("The service is busy"),
 }  # of pages
 _MOST_ERRORS = 20  # of one body
-_BRIEF = reprlib.Repr()
-_BRIEF.maxstring = 80
 
 
 class ProblemMiddleware:
@@ -146,13 +144,7 @@ def _told(request: Request, error: Exception) -> ServiceError:
 
 
 def _malformed(error: RequestValidationError) -> ServiceError:
-    errors = tuple(
-        FieldError(
-            pointer="".join(f"/{part}" for part in item["loc"] if part != "body")[:200],
-            reason=f"{item['msg']}, got {_BRIEF.repr(item.get('input')):.80}",
-        )
-        for item in error.errors()[:_MOST_ERRORS]
-    )
+    errors = field_errors(error.errors()[:_MOST_ERRORS])
     detail = "; ".join(f"{item.pointer[1:] or 'body'}: {item.reason}" for item in errors)
     return _other(422, "malformed", detail, errors)
 
