@@ -28,6 +28,7 @@ from service.api.schemas import (
 )
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
+from service.degrees import in_degrees
 from service.enums import PoseState
 from service.notifications.send import read_url
 from service.wording.typed_pose import judge_typed
@@ -113,7 +114,11 @@ class CameraBody(_LensedBody):
 
 
 class CameraPatch(_LensedBody):
-    """What to change of a camera; fields left out stay. A prior pose has to be a whole one."""
+    """What to change of a camera; fields left out stay.
+
+    Measurements in place of a whole `prior_pose` replace the earlier ones; they are taken until the
+    camera has a prior pose.
+    """
 
     name: CameraName | None = Field(None, description="empty: its id")
     site: Site | None = None
@@ -125,12 +130,6 @@ class CameraPatch(_LensedBody):
     reference_tracks: ReferenceTracks | None = None
     snapshot_url: SnapshotUrl | Literal[""] | None = Field(None, description="empty: none")
 
-    @model_validator(mode="after")
-    def _whole_pose(self) -> Self:
-        if self.prior_pose is not None and self.prior_pose.measured:
-            raise ValueError("prior_pose: a whole one is needed to change it")
-        return self
-
 
 class QuestionOut(Out):
     """What may be a slip, refuses nothing, and was stored as it came; `field` is the suspect."""
@@ -139,8 +138,16 @@ class QuestionOut(Out):
     text: str
 
 
+class MeasuredOut(BaseModel):
+    """Measurements of a pose that is not confirmed yet; null where not measured."""
+
+    height_m: float | None = None
+    tilt_deg: float | None = None
+    roll_deg: float | None = None
+
+
 class CameraOut(Out):
-    """A registered camera."""
+    """A registered camera; `measured` is null once it has a prior pose."""
 
     id: str
     name: str
@@ -148,6 +155,7 @@ class CameraOut(Out):
     tags: list[str]
     intrinsics: IntrinsicsOut
     prior_pose: PoseOut | None
+    measured: MeasuredOut | None
     frame_rate_hz: float | None
     walking_speed: WalkingSpeedBody
     reference_tracks: int
@@ -168,6 +176,7 @@ class CameraOut(Out):
             record,
             intrinsics=IntrinsicsOut.model_validate(asdict(view.intrinsics)),
             prior_pose=PoseOut.from_value(view.prior_pose) if view.calibrated else None,
+            measured=MeasuredOut(**in_degrees(view.measured)) if view.measured else None,
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps
             ),
@@ -261,6 +270,7 @@ def change(
     `If-Match` is the ETag of the camera as it was read; without it the answer, 428, has it in
     `etag`, and so has that of a change made of an older version, 412.
     """
+    prior = body.prior_pose
     speed = {} if body.walking_speed is None else body.walking_speed.model_dump(exclude_unset=True)
     view = cameras.change_camera(
         session,
@@ -273,7 +283,8 @@ def change(
             site=body.site,
             tags=body.tags,
             intrinsics=body.lens_value(),
-            prior_pose=None if body.prior_pose is None else body.prior_pose.to_value(),
+            prior_pose=None if prior is None or prior.measured else prior.to_value(),
+            given=(None if prior is None else prior.measured) or None,
             frame_rate_hz=body.frame_rate_hz,
             walking_speed_mean_mps=speed.get("mean_mps"),
             walking_speed_sd_mps=speed.get("sd_mps"),
