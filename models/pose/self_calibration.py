@@ -120,7 +120,7 @@ class _Tape:
             widening,
             information @ fitted.mean + self.precision @ (fitted.mean - self.mean) / few,
         )
-        covariance = np.linalg.inv(by_tracks + self.precision)
+        covariance = np.asarray(np.linalg.inv(by_tracks + self.precision), dtype=np.float64)
         return Normal(mean=covariance @ (pull + self.precision @ self.mean), covariance=covariance)
 
 
@@ -168,7 +168,7 @@ def _end_of(
         enough=groups >= walking.FEWEST_GROUPS
         and (
             len(channels) > 1
-            or tape.precision[:2, :2].any()
+            or bool(tape.precision[:2].any())
             or _across(speeds_at_end) >= config.LEAST_ACROSS
         ),
     )

@@ -73,7 +73,7 @@ def test_measurement_has_its_own_sd(lens, boxes, measured, tilt_deg, roll_deg, h
 
 
 def test_wrong_measurement_is_weighed_with_the_tracks(lens):
-    """Boxes know the height to 14 % and a tape to 5 %: 12 % of an error of the tape is corrected."""
+    """Boxes know the height to 14 %, a tape to 5 %: an error of the tape shrinks by some 12 %."""
     found = self_calibrate(people(lens), lens, WALK, {"height_m": 1.1 * POSE.height_m})
     error = found.values[2] - math.log(POSE.height_m)
     assert 0.75 * math.log(1.1) < error < 0.95 * math.log(1.1)
