@@ -12,6 +12,7 @@ from service.api import (
     acts,
     aim,
     alerts,
+    calibrations,
     cameras,
     client,
     documented,
@@ -114,6 +115,7 @@ def create_app(settings: Settings) -> FastAPI:
     for module in (
         tracks,
         poses,
+        calibrations,
         cameras,
         sources,
         snapshots,

@@ -53,6 +53,7 @@ PUBLIC_MODELS = {
     "models.geometry.crossings": "who crosses a line, and who would if it lay elsewhere",
     "models.geometry.footprint": "the ground in the picture",
     "models.geometry.ground": "feet, horizons and people who are placed wrong",
+    "models.geometry.ground_homography": "a pose that is given by a homography",
     "models.geometry.hints": "what a person marks in a picture",
     "models.geometry.intrinsics": "the lens",
     "models.geometry.lens_checks": "lenses that no camera has, and likely mistakes",

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from fastapi import APIRouter, Query, Response
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
+from models.errors import CalibrationError
 from models.geometry.intrinsics import Intrinsics
 from service.api.documented import ETAG
 from service.api.ignored import NamingRoute
@@ -52,15 +53,26 @@ class WalkingSpeedBody(Body):
 
 
 class _LensedBody(Body):
-    """A camera's lens, in one of two forms."""
+    """A camera's lens, in one of two forms, and its prior pose."""
 
     intrinsics: IntrinsicsBody | None = None
     lens: LensBody | None = None
+    prior_pose: PriorPoseBody | None = None
 
     @model_validator(mode="after")
     def _one_lens(self) -> Self:
         if self.intrinsics is not None and self.lens is not None:
             raise ValueError("either intrinsics or lens is taken, got both")
+        return self
+
+    @model_validator(mode="after")
+    def _homography_fits_lens(self) -> Self:
+        lens, prior = self.lens_value(), self.prior_pose
+        if lens is not None and prior is not None and prior.homography is not None:
+            try:
+                prior.to_value(lens)
+            except CalibrationError as error:
+                raise ValueError(f"prior_pose: {error}") from error
         return self
 
     def lens_value(self) -> Intrinsics | None:
@@ -79,7 +91,6 @@ class CameraBody(_LensedBody):
     name: CameraName | None = None
     site: Site = ""
     tags: Tags = []
-    prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
     reference_tracks: ReferenceTracks = 200
@@ -101,7 +112,7 @@ class CameraBody(_LensedBody):
             camera_id=self.id or (slug(self.name) if self.name else None) or None,
             name=self.name or "",
             intrinsics=intrinsics,
-            prior_pose=None if prior is None or measured else prior.to_value(),
+            prior_pose=None if prior is None or measured else prior.to_value(intrinsics),
             given=measured,
             frame_rate_hz=self.frame_rate_hz,
             walking_speed_mean_mps=self.walking_speed.mean_mps,
@@ -124,7 +135,6 @@ class CameraPatch(_LensedBody):
     site: Site | None = None
     tags: Tags | None = None
     by: Who | None = None
-    prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
     reference_tracks: ReferenceTracks | None = None
@@ -271,6 +281,7 @@ def change(
     `etag`, and so has that of a change made of an older version, 412.
     """
     prior = body.prior_pose
+    whole = None if prior is None or prior.measured or prior.homography is not None else prior
     speed = {} if body.walking_speed is None else body.walking_speed.model_dump(exclude_unset=True)
     view = cameras.change_camera(
         session,
@@ -283,7 +294,8 @@ def change(
             site=body.site,
             tags=body.tags,
             intrinsics=body.lens_value(),
-            prior_pose=None if prior is None or prior.measured else prior.to_value(),
+            prior_pose=None if whole is None else whole.to_value(),
+            homography=None if prior is None else prior.homography,
             given=(None if prior is None else prior.measured) or None,
             frame_rate_hz=body.frame_rate_hz,
             walking_speed_mean_mps=speed.get("mean_mps"),

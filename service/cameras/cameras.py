@@ -3,14 +3,16 @@
 import itertools
 import secrets
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy.orm import Session
 
+from models.geometry.ground_homography import pose_from_homography
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
 from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
@@ -60,7 +62,11 @@ class CameraSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraChange:
-    """Changes to a camera; None stays. `given` is as in `CameraSpec`, instead of a prior pose."""
+    """Changes to a camera; None stays.
+
+    Instead of a prior pose: `given` as in `CameraSpec`, or a `homography` (3, 3) from the ground to
+    the undistorted image, which the lens makes a pose.
+    """
 
     name: str | None = None
     site: str | None = None
@@ -68,6 +74,7 @@ class CameraChange:
     intrinsics: Intrinsics | None = None
     prior_pose: CameraPose | None = None
     given: Mapping[str, float] | None = None
+    homography: Array | None = None
     frame_rate_hz: float | None = None
     walking_speed_mean_mps: float | None = None
     walking_speed_sd_mps: float | None = None
@@ -213,6 +220,7 @@ def change_camera(
         PreconditionFailedError: it was changed since the client read it.
         PreconditionRequiredError: the client does not say what it has read.
         ConflictError: measurements are given of a camera that has a prior pose.
+        DegenerateGeometryError: the homography contradicts the lens.
     """
     record = require_camera(session, camera_id)
     check_version("the camera is", etag_of(record), etag)
@@ -222,14 +230,18 @@ def change_camera(
             "prior_pose: the camera has one; height_m and tilt_deg are both required to replace it "
             f"(got {', '.join(sorted(in_degrees(change.given)))})"
         )
+    if change.homography is not None:
+        lens = change.intrinsics or record.intrinsics
+        pose = pose_from_homography(change.homography, lens)
+        change = replace(change, prior_pose=pose, homography=None)
     changed = {
         field.name: getattr(change, field.name)
         for field in fields(change)
         if getattr(change, field.name) is not None
     }
-    lens = {} if change.intrinsics is None else _columns(change.intrinsics)
+    columns = {} if change.intrinsics is None else _columns(change.intrinsics)
     size = record.width, record.height
-    for name, value in {**changed, **lens}.items():
+    for name, value in {**changed, **columns}.items():
         if name not in ("intrinsics", "prior_pose", "given"):
             setattr(record, name, value)
     record.name, record.site = record.name or record.id, record.site or None

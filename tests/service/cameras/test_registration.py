@@ -195,12 +195,14 @@ def test_any_other_text_is_refused_in_words(http):
 
 
 def test_a_rational_lens_is_refused_in_words(http):
+    """An Azure Kinect's factory calibration: five coefficients are 5.5 px off in its corner."""
     storage = cv2.FileStorage(".yml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
-    storage.write("K", np.eye(3))
-    storage.write("D", np.full(8, 0.1))
+    storage.write("K", np.array([[975.8, 0, 1020], [0, 975.6, 775], [0, 0, 1]]))
+    storage.write("D", np.array([0.5217, -2.7123, 8e-4, -1e-4, 1.5583, 0.3994, -2.5348, 1.4865]))
     document = problem(
         http.post("/ui/calibration", content=storage.releaseAndGetString()), 422, "malformed"
     )
+    assert "must be within 3.2 px" in document["detail"]
     assert "CALIB_RATIONAL_MODEL" in document["detail"]
 
 
