@@ -38,7 +38,13 @@ router = APIRouter(prefix="/calibrations", tags=["cameras"])
 
 _FILE = {"schema": {"type": "string", "format": "binary"}}
 _BODY: dict[str, Any] = {
-    "requestBody": {"required": True, "content": {"application/octet-stream": _FILE}}
+    "requestBody": {
+        "required": True,
+        "content": {
+            "application/octet-stream": _FILE,
+            "application/json": {"schema": {"type": "object"}},
+        },
+    }
 }
 
 

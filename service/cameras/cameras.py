@@ -19,7 +19,6 @@ from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
 from service.cameras.held_poses import held_pose, keep_drawn
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
-from service.degrees import in_degrees
 from service.enums import Activity, AlertState, Origin, Outcome, PoseState
 from service.errors import (
     ConflictError,
@@ -228,7 +227,7 @@ def change_camera(
     if change.given is not None and not prior.assumed:
         raise ConflictError(
             "prior_pose: the camera has one; height_m and tilt_deg are both required to replace it "
-            f"(got {', '.join(sorted(in_degrees(change.given)))})"
+            f"(got {len(change.given)} of height_m, tilt_deg, roll_deg)"
         )
     if change.homography is not None:
         lens = change.intrinsics or record.intrinsics

@@ -41,6 +41,7 @@ _REASONS = {
     "literal_error": N_("must be {expected} (got {got})"),
 }
 _FOLLOWS = "default_factory_not_called"  # from the error of another field
+_GOT = re.compile(r"\bgot\b")
 _NAMED = re.compile(r"([a-z][a-z0-9_]*): (.*)", re.DOTALL)
 _MOST_CHARACTERS = 80
 _BRIEF = reprlib.Repr()
@@ -66,7 +67,7 @@ def _field_error(item: ErrorDetails) -> FieldError:
             if not pointer.endswith(f"/{named[1]}"):
                 pointer = f"{pointer}/{named[1]}"
             reason = named[2]
-        elif "got " not in reason and not isinstance(got, dict | list):
+        elif not _GOT.search(reason) and not isinstance(got, dict | list):
             reason = f"{reason} (got {_brief(got)})"
     return FieldError(pointer=pointer[:200], reason=reason)
 

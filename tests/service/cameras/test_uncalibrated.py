@@ -122,7 +122,7 @@ def test_patch_takes_measurements_until_there_is_a_prior_pose(street):
     again = street.http.patch("/cameras/corner", json={"prior_pose": given}, headers=headers)
     assert problem(again, 409, "conflict")["detail"] == (
         "prior_pose: the camera has one; height_m and tilt_deg are both required to replace it "
-        "(got height_m, roll_deg)"
+        "(got 2 of height_m, tilt_deg, roll_deg)"
     )
 
 
