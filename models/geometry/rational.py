@@ -19,6 +19,9 @@ _COUNTS = (8, 12, 14)
 _RAYS = 41  # a side
 _RADII = 1024  # that are tried for the image's corner
 _LONGEST = 10.0  # ray, z = 1: 84 deg from the axis
+# Calibrations may fold in the last corners of the image, where no board was seen: they are compared
+# up to there, and have to reach this share of the way to the corner (half the height, at 16:9).
+_LEAST_REACH, _WITHIN_FOLD = 0.5, 0.98
 
 
 class Replacement(NamedTuple):
@@ -80,7 +83,7 @@ def _solved(
 
 
 def _longest_ray(coefficients: Array, corner: float) -> float:
-    """The length of the ray that ends in the image's corner, focal length 1."""
+    """The length of the ray that ends in the image's corner, or just before the lens folds."""
     k1, k2, _, _, k3, k4, k5, k6 = coefficients[:8]
     above, below = np.array([k3, k2, k1, 1.0]), np.array([k6, k5, k4, 1.0])
     # r N(s) / D(s), s = r^2, grows while N D + 2 s (N' D - N D') is above 0.
@@ -92,12 +95,13 @@ def _longest_ray(coefficients: Array, corner: float) -> float:
     radii = np.linspace(0, edge, _RADII)[:-1]
     s = radii * radii
     image = radii * np.polyval(above, s) / np.polyval(below, s)
-    if image.max() < corner:
+    least = _LEAST_REACH * corner
+    if image.max() < least:
         raise ShapeError(
-            f"distortion: must not fold back within {corner:.3g} focal lengths from the principal "
-            f"point, where the image's corner is (got a fold at {image.max():.3g})"
+            f"distortion: must not fold back within {least:.3g} focal lengths of the principal "
+            f"point, half the way to the image's corner (got a fold at {image.max():.3g})"
         )
-    return float(np.interp(corner, image, radii))
+    return float(np.interp(min(corner, _WITHIN_FOLD * image.max()), image, radii))
 
 
 def _bent(coefficients: Array, rays: Array) -> Array:

@@ -61,13 +61,13 @@ def _field_error(item: ErrorDetails) -> FieldError:
         words = _REASONS[item["type"]]
         reason = _(words, **{"got": _brief(got), **context})
     else:
-        reason = str(context.get("error", item["msg"]))
+        reason = str(context.get("error", item["msg"]))  # one of our own has `said`: it is whole
         # The checks of an object name the field that they reject.
         if isinstance(got, dict) and (named := _NAMED.fullmatch(reason)):
             if not pointer.endswith(f"/{named[1]}"):
                 pointer = f"{pointer}/{named[1]}"
             reason = named[2]
-        elif not _GOT.search(reason) and not isinstance(got, dict | list):
+        elif "said" not in context and not _GOT.search(reason) and not isinstance(got, dict | list):
             reason = f"{reason} (got {_brief(got)})"
     return FieldError(pointer=pointer[:200], reason=reason)
 

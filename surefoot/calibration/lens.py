@@ -14,7 +14,10 @@ from surefoot.calibration.value import CalibrationFileError, Note
 
 _PERSPECTIVES = ("plumb_bob", "radtan", "radial-tangential", "none", "rational_polynomial",
                  "brown_conrady", "opencv", "perspective")  # fmt: skip
-_FISHEYES = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4", "opencv_fisheye")
+FISHEYES = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4", "opencv_fisheye")
+# Models of other tools that a lens of ours does not describe.
+OTHERS = ("omni", "omnidirectional", "mei", "ds", "eucm", "fov", "scaramuzza", "ocam",
+          "inverse_brown_conrady", "division", "ftheta", "thin_prism_fisheye")  # fmt: skip
 _COUNTS = {Projection.PERSPECTIVE: (1, 2, 3, 4, 5, 8, 12, 14), Projection.FISHEYE: (4,)}
 _MOST_OFF_PX = 3.0  # at a width of 1920, as marks in an image: a lens in place of another
 _SKEW_PX = 0.5  # more is noted
@@ -61,12 +64,12 @@ def projection_of(model: str | None) -> Projection:
         CalibrationFileError: it is none of ours.
     """
     word = (model or "none").strip().lower()
-    if word in _FISHEYES:
+    if word in FISHEYES:
         return Projection.FISHEYE
     if word in _PERSPECTIVES:
         return Projection.PERSPECTIVE
     raise CalibrationFileError(
-        f"distortion_model: must be {', '.join(_PERSPECTIVES[:-1])} or {', '.join(_FISHEYES)} "
+        f"distortion_model: must be {', '.join(_PERSPECTIVES[:-1])} or {', '.join(FISHEYES)} "
         f"(got {word!r:.40})"
     )
 

@@ -10,7 +10,14 @@ from typing import Any
 from models.geometry.intrinsics import Projection
 from models.geometry.rotation import rotation_from_vector
 from surefoot.calibration.fields import field_numbers, image_size, named, numbers
-from surefoot.calibration.lens import Notes, camera_matrix, distortion_of, projection_of
+from surefoot.calibration.lens import (
+    FISHEYES,
+    OTHERS,
+    Notes,
+    camera_matrix,
+    distortion_of,
+    projection_of,
+)
 from surefoot.calibration.value import Calibration, Note
 
 Document = Mapping[str, Any]
@@ -33,8 +40,11 @@ _SECOND = ("K2", "M2", "D2", "cameraMatrix2", "CameraMatrix2", "camera_matrix_2"
            "IntrinsicMatrix2", "R1", "R2", "P1", "P2", "Q", "E", "F")  # fmt: skip
 _RECTIFIED = ("rectification_matrix", "projection_matrix", "P", "p")
 _CENTRES = {"cx": ("cx", "ppx", "u0", "c_x"), "cy": ("cy", "ppy", "v0", "c_y")}
-_FOCALS = {"fx": ("fx", "f_x", "focal_x"), "fy": ("fy", "f_y", "focal_y")}
+_FOCALS = {"fx": ("fx", "fl_x", "f_x", "focal_x"), "fy": ("fy", "fl_y", "f_y", "focal_y")}
 _TERMS = ("k1", "k2", "p1", "p2", "k3")
+_FISHEYE_TERMS = ("k1", "k2", "k3", "k4")
+# Names that are as often of a device: of these only known words count.
+_MODELS = ("model", "camera_model", "projection", "lens_model", "type", "model_type")
 
 
 def is_opencv(document: Document) -> bool:
@@ -63,12 +73,8 @@ def read_opencv(document: Document, notation: str) -> Calibration:
         return _flat(document, notation)
     ros = _is_ros(document)
     found = camera_matrix(document, _MATRICES) if _has_matrix(document) else None
-    model = document.get("distortion_model")
-    projection = projection_of(model if isinstance(model, str) else None)
-    flag = numbers(document.get("fisheye_model"))
-    if flag and flag[0]:
-        projection = Projection.FISHEYE
     size = image_size(document)
+    projection = _projection(document)
     given = field_numbers(document, _DISTORTIONS, range(1, 15))
     notes: Notes = {} if found is None else found.notes
     distortion: tuple[float, ...] | None = None
@@ -98,6 +104,25 @@ def _has_matrix(document: Document) -> bool:
     return name is not None and not (
         isinstance(document[name], Mapping) and "data" not in document[name]
     )
+
+
+def _projection(document: Document) -> Projection:
+    """The projection by OpenCV's flag, by `distortion_model`, or by a known word for a model.
+
+    Raises:
+        CalibrationFileError: the distortion model is none of ours.
+    """
+    flag = numbers(document.get("fisheye_model"))
+    if (flag and flag[0]) or str(document.get("is_fisheye")).lower() == "true":
+        return Projection.FISHEYE
+    given = document.get("distortion_model")
+    if isinstance(given, str):
+        return projection_of(given)
+    words = [document[name] for name in _MODELS if isinstance(document.get(name), str)]
+    for word in (each.rpartition(".")[2].strip().lower() for each in words):
+        if word in FISHEYES or word in OTHERS:
+            return projection_of(word)
+    return Projection.PERSPECTIVE
 
 
 def _is_ros(document: Document) -> bool:
@@ -159,14 +184,14 @@ def _flat(document: Document, notation: str) -> Calibration:
     )
     matrix = (fx, 0.0, cx, 0.0, fy or fx, cy, 0.0, 0.0, 1.0)
     size = image_size(document)
-    model = named(document, ("distortion_model", "projection", "model"))
-    word = document[model] if model else None
     given = field_numbers(document, _DISTORTIONS, range(1, 15))
-    if given is None and named(document, _TERMS):
-        given = [(field_numbers(document, (term,), (1,)) or [0.0])[0] for term in _TERMS]
     # RealSense names a model that is none of ours beside five zeros.
-    bent = isinstance(word, str) and (word == Projection.FISHEYE or any(given or ()))
-    projection = projection_of(word.rpartition(".")[2] if bent and word else None)
+    projection = Projection.PERSPECTIVE
+    if given is None or any(given) or len(given) == 4:
+        projection = _projection(document)
+    terms = _FISHEYE_TERMS if projection is Projection.FISHEYE else _TERMS
+    if given is None and named(document, terms):
+        given = [(field_numbers(document, (term,), (1,)) or [0.0])[0] for term in terms]
     lens = None if given is None else distortion_of(given, projection, matrix, size)
     notes: Notes = {} if lens is None else lens.notes
     rotation, translation = _pose(document, ros=False, notes=notes)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from models.errors import ShapeError
 from models.geometry.rotation import rotation_from_quaternion
 from surefoot.calibration.colmap import chosen_of, read_colmap
+from surefoot.calibration.dialects import merged, nested, ros_ini
 from surefoot.calibration.documents import (
     Document,
     archive_entries,
@@ -52,6 +53,8 @@ def read_calibration_file(body: bytes, camera: str | None = None) -> Calibration
         krtd = read_krtd(text)
     if krtd is not None:
         return krtd
+    if (ini := ros_ini(text)) is not None:
+        return _of_document(ini, "INI", camera)
     notation, found = documents(text)
     if not found:
         raise CalibrationFileError(f"file: must be a calibration, {FORMATS} (got other text)")
@@ -113,7 +116,7 @@ def _of_document(document: Document, notation: str, camera: str | None) -> Calib
             return read_nvidia(chosen_of(sensors, camera), kind)
     if is_registration(document) and {"prior_pose", "true_pose"} & document.keys():
         return _registered(document)
-    found = _cameras(document, _DEEPEST)
+    found = _cameras(nested(document), _DEEPEST)
     if not found:
         raise CalibrationFileError(
             f"file: must have a camera matrix (camera_matrix, mtx, K) or a rotation (R, rvec), got "
@@ -129,6 +132,8 @@ def _of_document(document: Document, notation: str, camera: str | None) -> Calib
 
 def _cameras(document: Document, deepest: int) -> dict[str, Document]:
     """The objects of cameras in a document by their names; the document itself by ""."""
+    with _named("camodocal"):
+        document = merged(document)
     if is_kalibr(document) or is_opencv(document):
         return {"": document}
     found: dict[str, Document] = {}

@@ -51,7 +51,7 @@ def test_replacement_projects_as_opencv_does(coefficients, size, focal, projecti
         ([*OAKD, 0, 0, 0, 0, 0.01, 0], r"tau_x and tau_y of a tilted sensor must be 0 \(got 0.01"),
         (
             [-2.0, 0, 0, 0, 0, 0.01, 0, 0],
-            r"not fold back within 0.872 .* \(got a fold at 0.27",
+            r"not fold back within 0.436 .* \(got a fold at 0.27",
         ),
     ],
 )

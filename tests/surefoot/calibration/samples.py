@@ -20,6 +20,7 @@ class Sample(NamedTuple):
     size: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
     camera: str | None = None
+    fisheye: bool = False
 
 
 K = [[532.79, 0.0, 342.45], [0.0, 532.91, 233.9], [0.0, 0.0, 1.0]]
@@ -138,6 +139,87 @@ _MATLAB = _json(
 # An OAK-D's, whose eight coefficients five describe within a tenth of a pixel.
 _OAKD = [-3.4751670360565186, -38.5734748840332, 3.4309603506699204e-4, -9.377215610584244e-5,
          286.4400939941406, -3.6408045291900635, -36.68898010253906, 279.0523681640625]  # fmt: skip
+_CAMODOCAL = b"""%YAML:1.0
+---
+model_type: PINHOLE
+camera_name: camera
+image_width: 640
+image_height: 480
+distortion_parameters:
+   k1: -0.28
+   k2: 0.02
+   p1: 0.001
+   p2: -0.0001
+projection_parameters:
+   fx: 532.79
+   fy: 532.91
+   cx: 342.45
+   cy: 233.9
+"""
+_KANNALA_BRANDT = b"""%YAML:1.0
+
+model_type: KANNALA_BRANDT
+camera_name: fisheye
+image_width: 640
+image_height: 400
+
+projection_parameters:
+   k2: -0.013
+   k3: 0.011
+   k4: -0.009
+   k5: 0.002
+   mu: 190.1
+   mv: 190.2
+   u0: 320.5
+   v0: 199.1
+"""
+_ORB_SLAM = b"""%YAML:1.0
+
+Camera.type: "PinHole"
+Camera.fx: 532.79
+Camera.fy: 532.91
+Camera.cx: 342.45
+Camera.cy: 233.9
+
+Camera.k1: -0.28
+Camera.k2: 0.02
+Camera.p1: 0.001
+Camera.p2: -0.0001
+Camera.k3: 0.16
+
+Camera.width: 640
+Camera.height: 480
+Camera.fps: 30.0
+"""
+_ROS_INI = b"""[image]
+
+width
+640
+
+height
+480
+
+[mono_left]
+
+camera matrix
+369.344588 0.000000 320.739078
+0.000000 367.154330 203.592450
+0.000000 0.000000 1.000000
+
+distortion
+0.189544 -0.018229 -0.000630 0.000054 -0.000212
+
+rectification
+1.000000 0.000000 0.000000
+0.000000 1.000000 0.000000
+0.000000 0.000000 1.000000
+
+projection
+262.927429 0.000000 320.984481 0.000000
+0.000000 302.056213 188.592437 0.000000
+0.000000 0.000000 1.000000 0.000000
+
+"""
 _STEREO_YAML = f"""%YAML:1.0
 ---
 M1: !!opencv-matrix
@@ -190,6 +272,7 @@ SAMPLES = {
     "kalibr fisheye": Sample(
         _KALIBR, "Kalibr", (461.487, 460.111, 356.391, 231.157),
         (-0.0016, 0.0243, -0.0358, 0.0198), size=(752, 480), notes=("rig",), camera="cam0",
+        fisheye=True,
     ),
     "kalibr radtan": Sample(
         _KALIBR, "Kalibr", (457.587, 456.134, 379.999, 255.238),
@@ -210,6 +293,32 @@ SAMPLES = {
         "OpenCV JSON", (202.62, 202.62, 124.35, 127.29), None, size=(250, 250),
         notes=("fewer_coefficients",),
     ),
+    "orb-slam": Sample(
+        _ORB_SLAM, "YAML with fx, fy, cx, cy", _FOCAL, _D, size=(640, 480)
+    ),
+    "camodocal": Sample(
+        _CAMODOCAL, "YAML with fx, fy, cx, cy", _FOCAL, (*_D[:4], 0.0), size=(640, 480)
+    ),
+    "kannala-brandt": Sample(
+        _KANNALA_BRANDT, "YAML with fx, fy, cx, cy", (190.1, 190.2, 320.5, 199.1),
+        (-0.013, 0.011, -0.009, 0.002), size=(640, 400), fisheye=True,
+    ),
+    "ros ini": Sample(
+        _ROS_INI, "ROS camera_info", (369.344588, 367.15433, 320.739078, 203.59245),
+        (0.189544, -0.018229, -0.00063, 0.000054, -0.000212), size=(640, 480),
+    ),
+    "nerfstudio": Sample(
+        _json(camera_model="OPENCV_FISHEYE", fl_x=1000.1, fl_y=1000.2, cx=960.0, cy=540.0, w=1920,
+              h=1080, k1=0.02, k2=-0.003, k3=0.0002, k4=0.0, frames=[]),
+        "JSON with fx, fy, cx, cy", (1000.1, 1000.2, 960.0, 540.0), (0.02, -0.003, 0.0002, 0.0),
+        size=(1920, 1080), fisheye=True,
+    ),
+    "fisheye by its model": Sample(
+        _json(K=[[311.5, 0, 643.7], [0, 310.7, 345.0], [0, 0, 1]], D=[0.065, 0.0019, -0.0129, 2e-3],
+              model="equidistant", image_size=[1280, 720]),
+        "OpenCV JSON", (311.5, 310.7, 643.7, 345.0), (0.065, 0.0019, -0.0129, 0.002),
+        size=(1280, 720), fisheye=True,
+    ),
     "colmap cameras": Sample(
         b"# Camera list\n1 SIMPLE_RADIAL 640 480 532.79 342.95 234.4 -0.28\n", "COLMAP",
         (532.79, 532.79, 342.45, 233.9), (-0.28, 0.0, 0.0, 0.0, 0.0), size=(640, 480),
@@ -222,7 +331,13 @@ SAMPLES = {
 }  # fmt: skip
 
 _PAIR = _json(left={"K": K, "D": D}, right={"K": K, "D": D})
+# The coefficients of ros-perception/image_common, issue 33.
+_EIGHT = b"-0.000212 0.543582 -0.027892 0.000000"
 REJECTED = {
+    "ini of eight": (
+        _ROS_INI.replace(b"-0.000212", _EIGHT),
+        r"ROS camera_info: distortion: 8 coefficients must be within 1 px .* \(got 3.1 px\)",
+    ),
     "empty": (b" \n", "file: is empty"),
     "other text": (b"hello", r"file: must be a calibration, OpenCV or .* \(got other text\)"),
     "other yaml": (b"%YAML:1.0\n---\nx: 1\n", "file: must have a camera matrix .* got YAML with x"),

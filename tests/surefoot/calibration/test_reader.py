@@ -20,8 +20,9 @@ def test_file_is_read_with_its_values_and_notes(name):
     assert (skew, last) == (0.0, [0.0, 0.0, 1.0])
     if sample.distortion is not None:
         assert found.distortion == pytest.approx(sample.distortion)
-    fisheye = name == "kalibr fisheye"
-    assert found.projection == (Projection.FISHEYE if fisheye else Projection.PERSPECTIVE)
+    if sample.distortion is not None:
+        expected = Projection.FISHEYE if sample.fisheye else Projection.PERSPECTIVE
+        assert found.projection == expected
     assert found.size == sample.size
     assert tuple(found.notes) == sample.notes
     if name != "krtd":
