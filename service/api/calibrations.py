@@ -36,16 +36,9 @@ class CalibrationOut(BaseModel):
 
 router = APIRouter(prefix="/calibrations", tags=["cameras"])
 
-_FILE = {"schema": {"type": "string", "format": "binary"}}
-_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "application/octet-stream": _FILE,
-            "application/json": {"schema": {"type": "object"}},
-        },
-    }
-}
+# Any type is taken: the reader recognises the format by the content.
+_FILE = {"schema": {"type": "object", "description": "or YAML, XML, text, ZIP, .npz"}}
+_BODY: dict[str, Any] = {"requestBody": {"required": True, "content": {"application/json": _FILE}}}
 
 
 @router.post("", openapi_extra=_BODY)

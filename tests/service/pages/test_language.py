@@ -106,7 +106,7 @@ def test_a_form_is_answered_in_german(http):
     says = http.post("/ui/preview", json={"fields": typed}, headers=GERMAN).json()["says"]
     assert says[0]["text"].startswith("Die Kamera schaut 20,0° nach oben, also sind nur 12 % des")
     refused = http.post("/ui/register", json=typed | {"fx": ""}, headers=GERMAN).json()["errors"]
-    assert refused == [{"pointer": "/fx", "reason": "wird gebraucht"}]
+    assert refused == [{"pointer": "/fx", "reason": "ist erforderlich"}]
     # A height that R and t make is too much, and not under the ground, in each language.
     turned = {"form": "matrix", "rotation": "1.5707963 0 0", "translation_m": "0 20000 0"}
     for said in (GERMAN, {}):
