@@ -48,7 +48,7 @@ def read(
     width: Annotated[PictureSide | None, Query(description="if the file has no size")] = None,
     height: Annotated[PictureSide | None, Query(description="if the file has no size")] = None,
 ) -> CalibrationOut:
-    """Read a calibration file of OpenCV, ROS, Kalibr, MATLAB, COLMAP, NVIDIA or KRTD.
+    """Read a calibration file of OpenCV, ROS, Kalibr, MATLAB, COLMAP, NVIDIA, KRTD or Tsai.
 
     `intrinsics` and `prior_pose` of the answer fit `POST /cameras`; nothing is stored. `notes` has
     what the file holds and was not taken, such as the rotation between two cameras.

@@ -20,12 +20,13 @@ from surefoot.calibration.kalibr import is_kalibr, read_kalibr
 from surefoot.calibration.krtd import read_krtd
 from surefoot.calibration.nvidia import read_nvidia, sensors_of
 from surefoot.calibration.opencv import is_opencv, kind_of, read_opencv
+from surefoot.calibration.tsai import is_tsai, read_tsai
 from surefoot.calibration.value import Calibration, CalibrationFileError
 from surefoot.camera import camera_of, is_registration
 
 FORMATS = (
     "OpenCV or Python (YAML, XML, JSON, .npz), ROS camera_info, Kalibr, MATLAB, COLMAP "
-    "(cameras.txt, images.txt, or both in a ZIP), NVIDIA calibration.json, KRTD"
+    "(cameras.txt, or with images.txt in a ZIP), NVIDIA calibration.json, KRTD, Tsai XML"
 )
 _DEEPEST = 3  # objects in each other in which a camera is looked for
 _COLMAP = ("cameras.txt", "images.txt")
@@ -123,6 +124,9 @@ def _of_document(document: Document, notation: str, camera: str | None) -> Calib
             f"{notation} with {', '.join(list(document)[:8]) or 'nothing'}"
         )
     chosen = chosen_of(found, camera)
+    if is_tsai(chosen):
+        with _named("Tsai XML"):
+            return read_tsai(chosen)
     if is_kalibr(chosen):
         with _named("Kalibr"):
             return read_kalibr(chosen)
@@ -134,7 +138,7 @@ def _cameras(document: Document, deepest: int) -> dict[str, Document]:
     """The objects of cameras in a document by their names; the document itself by ""."""
     with _named("camodocal"):
         document = merged(document)
-    if is_kalibr(document) or is_opencv(document):
+    if is_tsai(document) or is_kalibr(document) or is_opencv(document):
         return {"": document}
     found: dict[str, Document] = {}
     for name, part in document.items():

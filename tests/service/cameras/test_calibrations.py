@@ -87,7 +87,7 @@ def test_sample_is_the_same_through_http_and_page(http, name):
     filled = http.post("/ui/calibration", content=sample.body, params=query).json()
     assert float(filled["fields"]["fx"]) == pytest.approx(sample.focal[0])
     assert all(note in filled["text"] for note in found["notes"])
-    assert ("rotation" in filled["fields"]) == (name == "krtd")
+    assert ("rotation" in filled["fields"]) == (name in ("krtd", "tsai"))
 
 
 @pytest.mark.parametrize("name", ["transposed", "stereo pair", "ros2 echo"])

@@ -220,6 +220,17 @@ projection
 0.000000 0.000000 1.000000 0.000000
 
 """
+# View 001 of PETS 2009, by the numbers of its published XML.
+TSAI = b"""<?xml version="1.0" encoding="UTF-8"?>
+<Camera name="View_001">
+  <Geometry width="768" height="576" ncx="795" nfx="752" dx="4.85e-03" dy="4.65e-03"
+    dpx="5.1273271277e-03" dpy="4.65e-03"/>
+  <Intrinsic focal="5.5549183034" kappa1="5.1113043639e-03" cx="324.22149053" cy="282.56650051"
+    sx="1.0937855397"/>
+  <Extrinsic tx="828.73214225" ty="-3175.4796051" tz="35469.298547"
+    rx="2.0405458695" ry="-0.89337703748" rz="-0.43056124791"/>
+</Camera>
+"""
 _STEREO_YAML = f"""%YAML:1.0
 ---
 M1: !!opencv-matrix
@@ -318,6 +329,10 @@ SAMPLES = {
               model="equidistant", image_size=[1280, 720]),
         "OpenCV JSON", (311.5, 310.7, 643.7, 345.0), (0.065, 0.0019, -0.0129, 0.002),
         size=(1280, 720), fisheye=True,
+    ),
+    "tsai": Sample(
+        TSAI, "Tsai XML", (1185.0013005, 1194.6060868, 324.22149053, 282.56650051),
+        (-0.1576699, 0.0732654, 0.0, 0.0, -0.03564), size=(768, 576),
     ),
     "colmap cameras": Sample(
         b"# Camera list\n1 SIMPLE_RADIAL 640 480 532.79 342.95 234.4 -0.28\n", "COLMAP",
