@@ -13,6 +13,7 @@ from service.api import (
     aim,
     alerts,
     bridges,
+    calibrations,
     cameras,
     client,
     documented,
@@ -115,6 +116,7 @@ def create_app(settings: Settings) -> FastAPI:
     for module in (
         tracks,
         poses,
+        calibrations,
         cameras,
         sources,
         snapshots,

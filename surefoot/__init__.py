@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from models.errors import CalibrationError
-    from surefoot.camera import Camera, Pose, read_camera
+    from surefoot.camera import Camera, Pose
+    from surefoot.camera_file import read_camera
     from surefoot.ground_points import ellipses, ground, image
     from surefoot.result import Result, estimate
     from surefoot.site import Site, learn, read_site
@@ -47,7 +48,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from models import errors
-    from surefoot import camera, ground_points, result, site, tracks
+    from surefoot import camera, camera_file, ground_points, result, site, tracks
 
-    parts = (errors, camera, ground_points, result, site, tracks)
+    parts = (errors, camera, camera_file, ground_points, result, site, tracks)
     return next(vars(part)[name] for part in parts if name in vars(part))

@@ -3,11 +3,11 @@
 import json
 import math
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, Self
 
 from models.errors import ShapeError
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.lens_checks import check_lens
 from models.geometry.lens_forms import lens_of
 from models.geometry.pose import CameraPose
 
@@ -59,21 +59,11 @@ class Camera:
         return json.dumps(asdict(self), indent=1)
 
 
-def read_camera(path: str | Path) -> Camera:
-    """The camera of a JSON file in the form of a registration over HTTP.
-
-    `intrinsics` has width, height, fx, fy, cx, cy and perhaps distortion (k1, k2, p1, p2, k3), or
-    projection fisheye with k1 to k4; or `lens` has width, height and hfov_deg, or focal_mm and
-    sensor_mm, or fisheye. `prior_pose` (or `true_pose`) has height_m, tilt_deg and perhaps
-    roll_deg, heading_deg, x_m, y_m. What else is there is not looked at.
-
-    Raises:
-        ShapeError: the file is missing, no JSON, or lacks a number.
-    """
-    try:
-        return camera_of(json.loads(Path(path).read_text()))
-    except (OSError, ValueError) as error:
-        raise ShapeError(f"{path}: {error}") from error
+def is_registration(document: Any) -> bool:
+    """True of an object with our names of a lens or of a prior pose."""
+    return isinstance(document, dict) and any(
+        isinstance(document.get(name), dict) for name in ("intrinsics", "lens", *_PRIOR)
+    )
 
 
 def camera_of(body: dict[str, Any]) -> Camera:
@@ -91,6 +81,7 @@ def camera_of(body: dict[str, Any]) -> Camera:
         raise ShapeError("intrinsics, lens: one of both is needed")
     try:
         lens = lens_of(**body["lens"]) if "lens" in body else Intrinsics(**body["intrinsics"])
+        check_lens(lens)
         camera = Camera(intrinsics=lens, prior_pose=Pose(**prior))
         _ = camera.prior_pose.in_radians  # refuses what no camera can have
     except (KeyError, TypeError, AttributeError, ZeroDivisionError) as error:

@@ -39,6 +39,14 @@ class Brown(NamedTuple):
         # d/dr r (1 + k1 r^2 + k2 r^4 + k3 r^6) as a polynomial in s = r^2
         return first_fold([7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0])
 
+    @property
+    def fold_radius(self) -> float:
+        """The image radius of the radial distortion's fold; infinite where it never folds."""
+        longest = self.max_radius
+        return (
+            longest * float(self._radial(np.array(longest**2))) if longest < math.inf else longest
+        )
+
     def angle_rad(self, radius: float) -> float:
         """The angle from the axis that an image radius is of, by the focal length alone."""
         return math.atan(radius)

@@ -45,6 +45,11 @@ class Fisheye(NamedTuple):
         """The length of the longest rays, z = 1."""
         return math.tan(self.max_angle_rad)
 
+    @property
+    def fold_radius(self) -> float:
+        """The image radius of the fold; infinite if the image grows up to 88 deg from the axis."""
+        return self._reach if self.max_angle_rad < MOST_ANGLE_RAD else math.inf
+
     def angle_rad(self, radius: float) -> float:
         """The angle from the axis that an image radius is of, by the focal length alone."""
         return radius

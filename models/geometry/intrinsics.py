@@ -122,6 +122,11 @@ class Intrinsics:
         return self._bending.max_radius
 
     @property
+    def fold_radius(self) -> float:
+        """The image radius, focal length 1, at which the distortion folds back; infinite if not."""
+        return self._bending.fold_radius
+
+    @property
     def widest_rad(self) -> float:
         """The widest view that a lens of this projection is made for."""
         return self._bending.widest_rad

@@ -210,3 +210,11 @@ def norm(vectors: Array) -> Array:
 def aside_of(directions: Array) -> Array:
     """Vectors (M, 2) a quarter turn to the left of others (M, 2)."""
     return np.column_stack([-directions[:, 1], directions[:, 0]])
+
+
+def rotation_from_vector(vector: Any) -> Array:
+    """Rotation (3, 3) about a vector (3,) by its length in radians, as OpenCV's `Rodrigues`."""
+    axis = np.asarray(vector, dtype=np.float64)
+    angle = float(np.linalg.norm(axis))
+    half = math.sin(angle / 2) / angle if angle > 1e-12 else 0.5
+    return rotation_from_quaternion([math.cos(angle / 2), *(half * axis)])

@@ -26,6 +26,11 @@ def usual_pose(measured: Mapping[str, float]) -> CameraPose:
     return CameraPose(**(usual | dict(measured)))
 
 
+def measured_precision(measured: Mapping[str, float]) -> Array:
+    """Inverse covariance (3, 3) of the measured tilt, roll and log height, 0 where not measured."""
+    return np.diag([name in measured for name in MEASURABLE] * _MEASURED_SD**-2.0)
+
+
 def usual_sd(measured: Mapping[str, float]) -> Array:
     """Standard deviations (3,) of that pose's tilt, roll (radians) and log height."""
     return np.where([name in measured for name in MEASURABLE], _MEASURED_SD, _SD)

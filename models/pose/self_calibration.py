@@ -2,7 +2,8 @@
 
 How fast people walk, and how tall they are where boxes measure it, is taken from other sites; that
 it is the same everywhere in the picture gives tilt and roll, its amount the height. Installers hang
-cameras level, about as high as a pole: a Gaussian each, as is what somebody has measured.
+cameras level, about as high as a pole: a Gaussian each. A site's habits offset what its tracks
+show; a measured height, tilt or roll has no such offset, and is weighed after it was added.
 
 Ours: a site's field has a level alone here. One that varies by place explains what a wrong pose
 does, the more the higher the camera is thought to be: of five scenes by speeds alone heights came
@@ -19,7 +20,7 @@ from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
-from models.geometry.usual_pose import AGREED_SD, usual_pose, usual_sd
+from models.geometry.usual_pose import AGREED_SD, measured_precision, usual_pose, usual_sd
 from models.pose import config
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations
@@ -83,24 +84,52 @@ def self_calibrate(
         for roll in config.CALIBRATION_ROLLS_RAD
     ]
     precision = np.linalg.inv(known.covariance)
+    tape = _Tape(mean=known.mean, precision=measured_precision(measured))
 
     def log_prior(candidate: Array) -> float:
         apart = candidate - known.mean
         return float(-apart @ precision @ apart / 2)
 
     begins = best_starts(speeds, grid, config.CALIBRATION_STARTS, log_prior)
-    ends = [end for each in begins if (end := _end_of(tracks, each, walk, known)) is not None]
+    ends = [end for each in begins if (end := _end_of(tracks, each, walk, known, tape)) is not None]
     if not ends:
         raise TooFewTrajectoriesError("tracks: no pose in reach explains them")
     return _mixed(ends)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class _Tape:
+    """Measured tilt, roll and log height: `mean` (3,), `precision` (3, 3) 0 where not measured."""
+
+    mean: Array
+    precision: Array
+
+    def joined_with(self, fitted: Normal, few: float) -> Normal:
+        """Posterior of a fit that has the measurements as a prior already, with the offset added.
+
+        The fit weighs them against its tracks alone, so they are taken out of it, the tracks'
+        covariance is widened by `few` and by the offset of a site, and they are put back.
+        """
+        information = np.linalg.inv(fitted.covariance) - self.precision
+        values, axes = np.linalg.eigh(information)
+        information = (axes * np.maximum(values, 0.0)) @ axes.T / few
+        # W = (I^-1 + D)^-1, also where I is singular.
+        widening = np.eye(3) + information @ np.diag(walking.PLAUSIBLE_OFFSET**2)
+        by_tracks = np.linalg.solve(widening, information)
+        pull = np.linalg.solve(
+            widening,
+            information @ fitted.mean + self.precision @ (fitted.mean - self.mean) / few,
+        )
+        covariance = np.asarray(np.linalg.inv(by_tracks + self.precision), dtype=np.float64)
+        return Normal(mean=covariance @ (pull + self.precision @ self.mean), covariance=covariance)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _End:
     """The end of a search, with the Gaussian there, and what it was made of.
 
-    It is `enough` where groups are, and boxes or different ways: by the speeds of people who all
-    walk one way, tilt and roll make up for one another.
+    It is `enough` if there are enough groups, and boxes, different directions or a measured angle:
+    the speeds of people who all walk one way leave tilt and roll to make up for one another.
     """
 
     log_posterior: float
@@ -109,7 +138,9 @@ class _End:
     enough: bool
 
 
-def _end_of(tracks: Observations, start: Array, walk: WalkConfig, known: Normal) -> _End | None:
+def _end_of(
+    tracks: Observations, start: Array, walk: WalkConfig, known: Normal, tape: _Tape
+) -> _End | None:
     """Where Gauss-Newton ends, with the scatter of speeds as it is there; None out of reach."""
     candidate = start
     for _ in range(config.CALIBRATION_ROUNDS):
@@ -129,13 +160,17 @@ def _end_of(tracks: Observations, start: Array, walk: WalkConfig, known: Normal)
     speeds_at_end = channels[0].measure(candidate=candidate, sloped=False)
     groups = count_walking_groups(speeds_at_end)
     few = max(1.0, walking.FEWEST_GROUPS / max(groups, 1))
-    covariance = fit.covariance * walking.ASSUMED_INFLATION * few
+    covariance = fit.covariance * walking.ASSUMED_INFLATION
     return _End(
         log_posterior=fit.log_likelihood / walking.ASSUMED_INFLATION,
-        normal=Normal(mean=candidate, covariance=covariance + np.diag(walking.PLAUSIBLE_OFFSET**2)),
+        normal=tape.joined_with(Normal(mean=candidate, covariance=covariance), few),
         walking_groups=groups,
         enough=groups >= walking.FEWEST_GROUPS
-        and (len(channels) > 1 or _across(speeds_at_end) >= config.LEAST_ACROSS),
+        and (
+            len(channels) > 1
+            or bool(tape.precision[:2].any())
+            or _across(speeds_at_end) >= config.LEAST_ACROSS
+        ),
     )
 
 

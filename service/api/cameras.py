@@ -14,6 +14,7 @@ from pydantic import (
     model_validator,
 )
 
+from models.errors import CalibrationError
 from models.geometry.intrinsics import Intrinsics
 from service.access.tokens import Caller, address_for
 from service.api.documented import ETAG
@@ -25,6 +26,7 @@ from service.api.schemas import (
     CameraId,
     Finite,
     IntrinsicsBody,
+    IntrinsicsOut,
     LensBody,
     Out,
     PoseOut,
@@ -35,6 +37,7 @@ from service.api.schemas import (
 )
 from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
+from service.degrees import in_degrees
 from service.enums import PoseState
 from service.notifications.fetch import Credentials
 from service.notifications.send import read_url
@@ -82,10 +85,11 @@ class WalkingSpeedBody(Body):
 
 
 class _LensedBody(Body):
-    """A camera's lens, in one of two forms."""
+    """A camera's lens, in one of two forms, and its prior pose."""
 
     intrinsics: IntrinsicsBody | None = None
     lens: LensBody | None = None
+    prior_pose: PriorPoseBody | None = None
 
     @model_validator(mode="after")
     def _one_lens(self) -> Self:
@@ -93,9 +97,19 @@ class _LensedBody(Body):
             raise ValueError("either intrinsics or lens is taken, got both")
         return self
 
+    @model_validator(mode="after")
+    def _homography_fits_lens(self) -> Self:
+        lens, prior = self.lens_value(), self.prior_pose
+        if lens is not None and prior is not None and prior.homography is not None:
+            try:
+                prior.to_value(lens)
+            except CalibrationError as error:
+                raise ValueError(f"prior_pose: {error}") from error
+        return self
+
     def lens_value(self) -> Intrinsics | None:
         """The lens in pixels; None where neither form is given."""
-        body = self.intrinsics if self.lens is None else self.lens.to_intrinsics()
+        body = self.lens or self.intrinsics
         return None if body is None else body.to_value()
 
 
@@ -109,7 +123,6 @@ class CameraBody(_LensedBody):
     name: CameraName | None = None
     site: Site = ""
     tags: Tags = []
-    prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody = Field(default_factory=WalkingSpeedBody)
     reference_tracks: ReferenceTracks = 200
@@ -132,7 +145,7 @@ class CameraBody(_LensedBody):
             camera_id=self.id or (slug(self.name) if self.name else None) or None,
             name=self.name or "",
             intrinsics=intrinsics,
-            prior_pose=None if prior is None or measured else prior.to_value(),
+            prior_pose=None if prior is None or measured else prior.to_value(intrinsics),
             given=measured,
             frame_rate_hz=self.frame_rate_hz,
             walking_speed_mean_mps=self.walking_speed.mean_mps,
@@ -146,13 +159,16 @@ class CameraBody(_LensedBody):
 
 
 class CameraPatch(_LensedBody):
-    """What to change of a camera; fields left out stay. A prior pose has to be a whole one."""
+    """What to change of a camera; fields left out stay.
+
+    Measurements in place of a whole `prior_pose` replace the earlier ones; they are taken until the
+    camera has a prior pose.
+    """
 
     name: CameraName | None = Field(None, description="empty: its id")
     site: Site | None = None
     tags: Tags | None = None
     by: Who | None = None
-    prior_pose: PriorPoseBody | None = None
     frame_rate_hz: FrameRate | None = None
     walking_speed: WalkingSpeedBody | None = None
     reference_tracks: ReferenceTracks | None = None
@@ -162,12 +178,6 @@ class CameraPatch(_LensedBody):
     snapshot_credentials: CredentialsBody | Literal[""] | None = Field(
         None, description="empty: none"
     )
-
-    @model_validator(mode="after")
-    def _whole_pose(self) -> Self:
-        if self.prior_pose is not None and self.prior_pose.measured:
-            raise ValueError("prior_pose: a whole one is needed to change it")
-        return self
 
 
 def _credentials(body: CredentialsBody | None) -> Credentials | None:
@@ -181,15 +191,28 @@ class QuestionOut(Out):
     text: str
 
 
+class MeasuredOut(BaseModel):
+    """Measurements of a pose that is not confirmed yet; null where not measured."""
+
+    height_m: float | None = None
+    tilt_deg: float | None = None
+    roll_deg: float | None = None
+
+
 class CameraOut(Out):
-    """A registered camera. Callers without `admin` see scheme and host of `snapshot_url` alone."""
+    """A registered camera.
+
+    Callers without `admin` see scheme and host of `snapshot_url` alone. `measured` is null once the
+    camera has a prior pose.
+    """
 
     id: str
     name: str
     site: str | None
     tags: list[str]
-    intrinsics: IntrinsicsBody
+    intrinsics: IntrinsicsOut
     prior_pose: PoseOut | None
+    measured: MeasuredOut | None
     frame_rate_hz: float | None
     walking_speed: WalkingSpeedBody
     reference_tracks: int
@@ -211,8 +234,9 @@ class CameraOut(Out):
             record,
             snapshot_url=address_for(caller, record.snapshot_url),
             snapshot_credentials_set=record.snapshot_credentials is not None,
-            intrinsics=IntrinsicsBody.model_validate(asdict(view.intrinsics)),
+            intrinsics=IntrinsicsOut.model_validate(asdict(view.intrinsics)),
             prior_pose=PoseOut.from_value(view.prior_pose) if view.calibrated else None,
+            measured=MeasuredOut(**in_degrees(view.measured)) if view.measured else None,
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps
             ),
@@ -311,6 +335,8 @@ def change(
     `etag`, and so has that of a change made of an older version, 412.
     """
     given = body.snapshot_credentials
+    prior = body.prior_pose
+    whole = None if prior is None or prior.measured or prior.homography is not None else prior
     speed = {} if body.walking_speed is None else body.walking_speed.model_dump(exclude_unset=True)
     view = cameras.change_camera(
         session,
@@ -323,7 +349,9 @@ def change(
             site=body.site,
             tags=body.tags,
             intrinsics=body.lens_value(),
-            prior_pose=None if body.prior_pose is None else body.prior_pose.to_value(),
+            prior_pose=None if whole is None else whole.to_value(),
+            homography=None if prior is None else prior.homography,
+            given=(None if prior is None else prior.measured) or None,
             frame_rate_hz=body.frame_rate_hz,
             walking_speed_mean_mps=speed.get("mean_mps"),
             walking_speed_sd_mps=speed.get("sd_mps"),

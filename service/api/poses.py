@@ -279,7 +279,7 @@ def show(
 ) -> ServedPoseOut | Response:
     """The pose now, how sure it is, and why the state is what it is; or a file of another tool's.
 
-    What each of the files holds and leaves out is in the guide to formats out.
+    What each of the files holds and leaves out is in the guide to formats.
     """
     view = poses.view_pose(session, state.settings, camera_id)
     headers = {"ETag": view.etag, **REVALIDATED}

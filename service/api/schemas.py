@@ -21,11 +21,18 @@ from pydantic import (
     model_validator,
 )
 
-from models.errors import CalibrationError
+from models.errors import ShapeError
+from models.geometry.ground_homography import inverse_homography, pose_from_homography
 from models.geometry.intrinsics import Intrinsics, Projection, coefficients_of
+from models.geometry.lens_checks import check_lens
 from models.geometry.lens_forms import lens_of
 from models.geometry.pose import CameraPose, pose_from_centre, pose_from_matrices
-from models.geometry.rotation import nearest_rotation, rotation_from_quaternion
+from models.geometry.rotation import (
+    Array,
+    nearest_rotation,
+    rotation_from_quaternion,
+    rotation_from_vector,
+)
 from service.api.ignored import note_ignored
 from service.degrees import in_degrees
 from service.enums import ReferenceState
@@ -124,7 +131,7 @@ class Out(BaseModel):
         return cls.model_validate({**own, **others})
 
 
-class IntrinsicsBody(Body):
+class IntrinsicsOut(Body):
     """Intrinsics in pixels; distortion k1, k2, p1, p2, k3, or of a fisheye k1, k2, k3, k4."""
 
     width: PictureSide
@@ -135,10 +142,18 @@ class IntrinsicsBody(Body):
     cy: Centre
     projection: Projection = Projection.PERSPECTIVE
     distortion: list[Coefficient] = Field(
-        default_factory=lambda said: [0.0] * len(coefficients_of(said["projection"])),
+        default_factory=lambda given: [0.0] * len(coefficients_of(given["projection"])),
         min_length=4,
         max_length=5,
     )
+
+
+class IntrinsicsBody(IntrinsicsOut):
+    """Intrinsics that a camera can have, in pixels.
+
+    The principal point (cx, cy) is within the image and the distortion does not fold back within
+    half of the image's shorter side from it.
+    """
 
     @field_validator("distortion")
     @classmethod
@@ -146,9 +161,14 @@ class IntrinsicsBody(Body):
         names = coefficients_of(info.data.get("projection", Projection.PERSPECTIVE))
         if len(value) != len(names):
             raise ValueError(
-                f"{len(names)} numbers, {', '.join(names)}, are needed, got {len(value)}"
+                f"must have {len(names)} numbers, {', '.join(names)} (got {len(value)})"
             )
         return value
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        check_lens(self.to_value())
+        return self
 
     def to_value(self) -> Intrinsics:
         """The lens as a value."""
@@ -181,21 +201,26 @@ class LensBody(Body):
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        _ = self.to_intrinsics()
+        check_lens(self.to_value())
         return self
 
-    def to_intrinsics(self) -> IntrinsicsBody:
+    def to_value(self) -> Intrinsics:
         """The lens in pixels."""
-        return IntrinsicsBody.model_validate(asdict(lens_of(**self.model_dump())))
+        return lens_of(**self.model_dump())
 
 
 _MEASURABLE = {"height_m", "tilt_deg", "roll_deg"}
 
 
-class PriorPoseBody(Body):
-    """A pose in one of four forms: angles, R and t, rvec and tvec, quaternion and position.
+Matrix = Annotated[list[Triple], Field(min_length=3, max_length=3)]
 
-    Of a camera that is registered, what was measured of height, tilt and roll is enough.
+
+class PriorPoseBody(Body):
+    """A pose in one of six forms.
+
+    Height and angles; R and t; rvec and tvec; quaternion and position; or a homography from the
+    ground, (x, y, 1) in metres, to undistorted pixels (u, v, 1) of the lens, or from there to the
+    ground. Before a camera has a prior pose, measured numbers of height, tilt and roll are enough.
     """
 
     height_m: Finite | None = None
@@ -204,12 +229,14 @@ class PriorPoseBody(Body):
     heading_deg: Annotated[Finite, Field(ge=-360, le=360)] = 0.0
     x_m: Finite = 0.0
     y_m: Finite = 0.0
-    rotation: Annotated[list[Triple], Field(min_length=3, max_length=3)] | None = None
+    rotation: Matrix | None = None
     translation_m: Triple | None = None
     rvec: Triple | None = None
     tvec_m: Triple | None = None
     quaternion_wxyz: Annotated[list[Finite], Field(min_length=4, max_length=4)] | None = None
     position_m: Triple | None = None
+    homography_image_from_ground: Matrix | None = None
+    homography_ground_from_image: Matrix | None = None
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -218,6 +245,8 @@ class PriorPoseBody(Body):
             {"rotation", "translation_m"},
             {"rvec", "tvec_m"},
             {"quaternion_wxyz", "position_m"},
+            {"homography_image_from_ground"},
+            {"homography_ground_from_image"},
         ]
         given = {name for name in self.model_fields_set if getattr(self, name) is not None}
         if self.measured:
@@ -225,19 +254,39 @@ class PriorPoseBody(Body):
         needed = [{"height_m", "tilt_deg"}, *forms[1:]]
         if not any(need <= given <= form for need, form in zip(needed, forms, strict=True)):
             raise ValueError(
-                "one form is needed: height_m and tilt_deg, rotation and translation_m, rvec and "
-                f"tvec_m, or quaternion_wxyz and position_m; got {sorted(given)}"
+                "must have one form: height_m and tilt_deg, rotation and translation_m, rvec and "
+                "tvec_m, quaternion_wxyz and position_m, homography_image_from_ground, or "
+                f"homography_ground_from_image (got {', '.join(sorted(given)) or 'none'})"
             )
-        try:
-            pose = self.to_value()
-        except CalibrationError as error:
-            raise ValueError(str(error)) from error
+        if self.homography is None:  # which is checked with its lens
+            self.check_place(self.to_value())
+        return self
+
+    @staticmethod
+    def check_place(pose: CameraPose) -> CameraPose:
+        """Return a pose that is not too far away to compute with.
+
+        Raises:
+            ShapeError: naming the number.
+        """
         limits = {"height_m": _HIGHEST_M, "x_m": _FARTHEST_M, "y_m": _FARTHEST_M}
         for name, limit in limits.items():
             value = getattr(pose, name)
             if not abs(value) <= limit:  # nor is it NaN
-                raise ValueError(f"{name}: at most {limit:g} m are taken, got {value:g}")
-        return self
+                raise ShapeError(f"{name}: at most {limit:g} m are taken, got {value:g}")
+        return pose
+
+    @property
+    def homography(self) -> Array | None:
+        """The homography (3, 3) from the ground to the image, if the pose is given by one.
+
+        Raises:
+            DegenerateGeometryError: it has no inverse.
+        """
+        if self.homography_ground_from_image is None:
+            given = self.homography_image_from_ground
+            return None if given is None else np.array(given)
+        return inverse_homography(np.array(self.homography_ground_from_image))
 
     @property
     def measured(self) -> dict[str, float]:
@@ -255,16 +304,21 @@ class PriorPoseBody(Body):
             for name, value in found.items()
         }
 
-    def to_value(self) -> CameraPose:
-        """The pose as a value, where it is whole."""
+    def to_value(self, lens: Intrinsics | None = None) -> CameraPose:
+        """The pose as a value, where it is whole; of a homography by the lens.
+
+        Raises:
+            CalibrationError: no camera has such a pose, or the homography contradicts the lens.
+        """
+        homography = self.homography
+        if homography is not None:
+            assert lens is not None
+            return self.check_place(pose_from_homography(homography, lens))
         if self.rotation is not None:
             rotation = nearest_rotation(self.rotation)
             return pose_from_matrices(rotation, np.array(self.translation_m))
         if self.rvec is not None:
-            import cv2  # 40 MB that few registrations need
-
-            rotation = np.asarray(cv2.Rodrigues(np.array(self.rvec))[0], dtype=np.float64)
-            return pose_from_matrices(rotation, np.array(self.tvec_m))
+            return pose_from_matrices(rotation_from_vector(self.rvec), np.array(self.tvec_m))
         if self.quaternion_wxyz is not None:
             rotation = rotation_from_quaternion(self.quaternion_wxyz)
             return pose_from_centre(rotation, np.array(self.position_m))

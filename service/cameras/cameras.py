@@ -3,14 +3,16 @@
 import itertools
 import secrets
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
+from models.geometry.ground_homography import pose_from_homography
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
+from models.geometry.rotation import Array
 from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
@@ -62,13 +64,19 @@ class CameraSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraChange:
-    """Changes to a camera; None stays."""
+    """Changes to a camera; None stays.
+
+    Instead of a prior pose: `given` as in `CameraSpec`, or a `homography` (3, 3) from the ground to
+    the undistorted image, which the lens makes a pose.
+    """
 
     name: str | None = None
     site: str | None = None
     tags: Sequence[str] | None = None
     intrinsics: Intrinsics | None = None
     prior_pose: CameraPose | None = None
+    given: Mapping[str, float] | None = None
+    homography: Array | None = None
     frame_rate_hz: float | None = None
     walking_speed_mean_mps: float | None = None
     walking_speed_sd_mps: float | None = None
@@ -77,16 +85,23 @@ class CameraChange:
     snapshot_credentials: Credentials | Literal[""] | None = None
 
 
-_SEPARATE = ("intrinsics", "prior_pose", "snapshot_url", "snapshot_credentials")  # not as they come
+_SEPARATE = (  # changes that are no columns, or have more to them
+    *("intrinsics", "prior_pose", "given", "homography"),
+    *("snapshot_url", "snapshot_credentials"),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraView:
-    """A camera as clients see it; `calibrated` once somebody has said or agreed to a prior pose."""
+    """A camera as clients see it; `calibrated` once its prior pose was given or confirmed.
+
+    `measured` is what is known of a pose before that, in metres and radians.
+    """
 
     record: CameraRecord
     prior_pose: CameraPose
     calibrated: bool
+    measured: Mapping[str, float]
     tracks: int
     model_id: str | None
     state: PoseState
@@ -215,17 +230,29 @@ def change_camera(
         NotFoundError: there is none of that id.
         PreconditionFailedError: it was changed since the client read it.
         PreconditionRequiredError: the client does not say what it has read.
+        ConflictError: measurements are given of a camera that has a prior pose.
+        DegenerateGeometryError: the homography contradicts the lens.
     """
     record = require_camera(session, camera_id)
     check_version("the camera is", etag_of(record), etag)
+    prior = cameras.prior_pose(session, camera_id)
+    if change.given is not None and not prior.assumed:
+        raise ConflictError(
+            "prior_pose: the camera has one; height_m and tilt_deg are both required to replace it "
+            f"(got {len(change.given)} of height_m, tilt_deg, roll_deg)"
+        )
+    if change.homography is not None:
+        lens = change.intrinsics or record.intrinsics
+        pose = pose_from_homography(change.homography, lens)
+        change = replace(change, prior_pose=pose, homography=None)
     changed = {
         field.name: getattr(change, field.name)
         for field in fields(change)
         if getattr(change, field.name) is not None
     }
-    lens = {} if change.intrinsics is None else _columns(change.intrinsics)
+    columns = {} if change.intrinsics is None else _columns(change.intrinsics)
     size = record.width, record.height
-    for name, value in {**changed, **lens}.items():
+    for name, value in {**changed, **columns}.items():
         if name not in _SEPARATE:
             setattr(record, name, value)
     record.name, record.site = record.name or record.id, record.site or None
@@ -238,7 +265,7 @@ def change_camera(
         request_estimate(session, queue, camera_id)
     geometry_changed = change.intrinsics is not None or change.prior_pose is not None
     speed_changed = "walking_speed_mean_mps" in changed or "walking_speed_sd_mps" in changed
-    if geometry_changed or speed_changed:
+    if geometry_changed or speed_changed or change.given is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
             close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, by))
@@ -246,7 +273,6 @@ def change_camera(
         from_s = reference.from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
-        prior = cameras.prior_pose(session, camera_id)
         pose, origin = change.prior_pose or prior.pose, Origin.CHANGED
         given: Sequence[str] = ()
         hints: Sequence[dict[str, Any]] = ()
@@ -255,6 +281,8 @@ def change_camera(
             covariance = prior.covariance
             if prior.assumed:
                 origin, given = Origin.ASSUMED, prior.given
+                if change.given is not None:
+                    pose, given = usual_pose(change.given), list(change.given)
                 hints = prior.hints if (record.width, record.height) == size else ()
         held = held_pose(session, camera_id)
         renew_prior_pose(
@@ -275,7 +303,8 @@ def change_camera(
     words = {name: value for name, value in changed.items() if name in _DESCRIBING}
     # An answer about the pose can be taken back after other words for the camera.
     what = Activity.CAMERA_CHANGED if len(words) < len(changed) else Activity.CAMERA_DESCRIBED
-    details = {"fields": list(changed), **words}
+    names = ["prior_pose" if name == "given" else name for name in changed]
+    details = {"fields": names, **words}
     note(session, what, by=by, camera_id=camera_id, details=details)
     tell_of_camera(session, camera_id)
     session.flush()
@@ -386,6 +415,7 @@ def _views(
             record=record,
             prior_pose=prior.pose,
             calibrated=not prior.assumed,
+            measured=prior.measured if prior.assumed else {},
             tracks=counts.get(record.id, 0),
             model_id=model_id,
             state=statuses[record.id].state,

@@ -12,7 +12,7 @@ from models.geometry.hints import Hint, HintKind, with_hints
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
-from models.geometry.usual_pose import AGREED_SD, usual_pose, usual_sd
+from models.geometry.usual_pose import AGREED_SD, measured_precision, usual_pose, usual_sd
 from service.store import cameras
 from service.store.cameras import PriorPoseRecord, ProposedPoseRecord
 
@@ -96,10 +96,14 @@ def hint_of(kept: dict[str, Any]) -> Hint:
 
 
 def _known(prior: PriorPoseRecord, people: ProposedPoseRecord | None) -> tuple[Array, Array]:
-    """The Gaussian (3,), (3, 3) beside the hints: people's, or how cameras are hung."""
+    """The Gaussian (3,), (3, 3) beside the hints: the people's, or how cameras are mounted."""
+    measured = prior.measured
     if people is None:
-        measured = prior.measured
         return plane_parameters_of(usual_pose(measured)), np.diag(usual_sd(measured) ** 2)
-    told = len(people.identifiable) == len(PLANE_PARAMETERS)
-    covariance = np.array(people.covariance) * (1.0 if told else _UNTOLD)
+    covariance = np.array(people.covariance)
+    if len(people.identifiable) < len(PLANE_PARAMETERS):
+        # The tracks are trusted less, the measurements among them are not.
+        share = 1 / _UNTOLD
+        by_tracks = share * np.linalg.inv(covariance)
+        covariance = np.linalg.inv(by_tracks + (1 - share) * measured_precision(measured))
     return plane_parameters_of(people.pose), covariance

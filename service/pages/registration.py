@@ -13,14 +13,15 @@ from models.geometry.usual_pose import usual_pose
 from service.api.cameras import CameraOut
 from service.api.middleware.dependencies import BodyDep, CallerDep, StateDep, WriteDep
 from service.api.middleware.pages import render
-from service.api.schemas import Body, Finite, Triple
+from service.api.schemas import Body, Finite, Text, Triple
 from service.cameras import cameras
-from service.formats.calibration_file import CalibrationFile, read_calibration
+from service.formats.calibration_file import read_calibration
 from service.formats.track import Clock, Limits
 from service.formats.track_text import read_text
 from service.pages.drawings.ground_plan import tried_ground_svg
 from service.pages.drawings.picture import Overlay, ground_of, picture_svg
 from service.pages.registration_form import RegistrationForm
+from service.wording.calibrations import notes_of
 from service.wording.connecting import skipped_words
 from service.wording.language import N_, _, _n
 from service.wording.typed_pose import (
@@ -30,6 +31,7 @@ from service.wording.typed_pose import (
     judge_typed,
     worst_first,
 )
+from surefoot.calibration.value import Calibration
 
 router = APIRouter(include_in_schema=False)
 
@@ -80,7 +82,7 @@ class FilledOut(BaseModel):
     text: str
 
     @classmethod
-    def from_value(cls, value: CalibrationFile) -> Self:
+    def from_value(cls, value: Calibration) -> Self:
         """The fields of a calibration."""
         fields: dict[str, str] = {}
         if value.size is not None:
@@ -94,16 +96,16 @@ class FilledOut(BaseModel):
         if value.rotation is not None:
             rows = [value.rotation[n : n + 3] for n in range(0, len(value.rotation), 3)]
             fields["rotation"] = "\n".join("  ".join(_say(n) for n in row) for row in rows)
-        if value.translation is not None:
-            fields["translation_m"] = "  ".join(_say(number) for number in value.translation)
+        if value.translation_m is not None:
+            fields["translation_m"] = "  ".join(_say(number) for number in value.translation_m)
         if "rotation" in fields and "translation_m" in fields:
             fields["form"] = "matrix"
         read = ", ".join(_(word) for name, word in _READ.items() if name in fields)
         missing = ", ".join(_(word) for name, word in _READ.items() if name not in fields)
-        text = _("Read: {names}.", names=read)
+        parts = [_("Read from {format}: {names}.", format=value.format, names=read)]
         if missing:
-            text += " " + _("Not in the file: {names}.", names=missing)
-        return cls(fields=fields, text=text)
+            parts.append(_("Not in the file: {names}.", names=missing))
+        return cls(fields=fields, text=" ".join([*parts, *notes_of(value)]))
 
 
 @router.get("/ui/register")
@@ -163,9 +165,9 @@ def _of_measured(said: Saying) -> Saying:
 
 
 @router.post("/ui/calibration")
-def calibration(body: BodyDep) -> FilledOut:
-    """The form's fields out of a calibration file of OpenCV's."""
-    return FilledOut.from_value(read_calibration(body))
+def calibration(body: BodyDep, camera: Text = "") -> FilledOut:
+    """The form's fields out of a calibration file."""
+    return FilledOut.from_value(read_calibration(body, camera or None))
 
 
 @router.post("/ui/tracks")

@@ -3,11 +3,11 @@
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
 from models.geometry.intrinsics import Projection, coefficients_of
 from service.api.cameras import CameraBody, FrameRate, ReferenceTracks
@@ -28,22 +28,12 @@ from service.api.schemas import (
     Triple,
 )
 from service.errors import FieldError, MalformedError
+from service.wording.body_errors import field_errors
 from service.wording.language import N_, _
 
 Made = TypeVar("Made", bound=BaseModel)
 Typed = Annotated[str, Field(max_length=2000)]
-_FOLLOWS = "default_factory_not_called"  # of another error, which is told
 _SEPARATORS = re.compile(r"[\s,;\[\]()]+")
-# What pydantic finds wrong, in the words of who types; `got` is what was typed.
-_REASONS = {
-    "missing": N_("is needed"),
-    "int_from_float": N_("a whole number is needed, got {got}"),
-    "greater_than": N_("more than {gt:g} is needed, got {got}"),
-    "greater_than_equal": N_("at least {ge:g} is needed, got {got}"),
-    "less_than_equal": N_("at most {le:g} is taken, got {got}"),
-    "string_too_long": N_("at most {max_length} letters are taken"),
-    "string_pattern_mismatch": N_("small letters, digits and hyphens are needed"),
-}
 # The field of the form that what a body makes of R and t is typed into.
 _OF_MATRIX = {
     "rvec": "rotation",
@@ -273,7 +263,9 @@ class RegistrationForm(Body):
             return self._read(TypedLens, errors)
         kind = TypedView if self.lens_form == "view" else TypedSensor
         lens: LensBody | None = self._read(kind, errors)
-        return None if lens is None else lens.to_intrinsics()
+        if lens is None:
+            return None
+        return IntrinsicsBody.model_validate(asdict(lens.to_value()))
 
     def _read(self, kind: type[Made], errors: list[FieldError]) -> Made | None:
         """A kind, made of those of its fields that are not empty."""
@@ -285,31 +277,19 @@ def _made(kind: type[Made], values: dict[str, Any], errors: list[FieldError]) ->
     try:
         return kind.model_validate(values)
     except ValidationError as error:
-        found = error.errors(include_url=False)
-        errors += [_field_error(item) for item in found if item["type"] != _FOLLOWS]
+        errors += [_of_form(each) for each in field_errors(error.errors(include_url=False))]
         return None
 
 
-def _field_error(item: ErrorDetails) -> FieldError:
-    """The field that an error is of, and the reason without the words of a programmer."""
-    said: dict[str, Any] = item.get("ctx", {})
-    if item["type"] == "value_error":  # of all fields together: it begins with a field's name
-        name, reason = str(said["error"]).partition(": ")[::2]
-        return FieldError(pointer=f"/{name}", reason=reason)
-    known, reason = _REASONS.get(item["type"]), item["msg"]  # which may have braces, as typed
-    if known is not None:
-        reason = _(known, **{"got": _brief(item["input"]), **said})
-    return FieldError(pointer=f"/{item['loc'][0]}", reason=reason)
+def _of_form(error: FieldError) -> FieldError:
+    """The error at its field of the form: the form has one for all numbers of a list."""
+    return replace(error, pointer="/".join(error.pointer.split("/")[:2]))
 
 
 def _of_matrix(error: FieldError) -> FieldError:
     """The same of the field that R and t were typed into."""
     name, reason = error.pointer[1:], error.reason
-    got = reason.split()[-1]
+    got = reason.split()[-1].strip("()")
     if name == "height_m" and not float(got) > 0:
         reason = _(_UNDER_GROUND, height=got)
     return FieldError(pointer=f"/{_OF_MATRIX.get(name, name)}", reason=reason)
-
-
-def _brief(value: object) -> str:
-    return f"{value:.10g}" if isinstance(value, float) else f"{value!r:.30}"

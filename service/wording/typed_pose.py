@@ -9,6 +9,7 @@ import numpy as np
 
 from models.geometry.ground import ground_from_pixel, ground_share, horizon_pixels, walking_speed
 from models.geometry.intrinsics import Intrinsics
+from models.geometry.lens_checks import LensDoubt, lens_questions
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from service.wording.language import N_, _
@@ -20,6 +21,35 @@ _LOW_M, _HIGH_M = 1.5, 60.0
 _UNITS = {N_("centimetres"): 100.0, N_("millimetres"): 1000.0}  # that heights are read off plans in
 _NARROW = math.radians(1)
 _LEVEL = math.radians(45)
+_OF_LENS = {
+    LensDoubt.CORNER: N_(
+        "The principal point ({cx:g}, {cy:g}) is at a corner of the image. Is the camera matrix "
+        "transposed, as MATLAB writes it? There, cx and cy are in the third row."
+    ),
+    LensDoubt.OTHER_SIZE: N_(
+        "The principal point ({cx:g}, {cy:g}) is the middle of an image of {width:.0f} x "
+        "{height:.0f}. Was the lens calibrated at that size? Scale fx, fy, cx and cy to this one."
+    ),
+    LensDoubt.SWAPPED: N_(
+        "The principal point ({cx:g}, {cy:g}) would be near the middle if width and height were "
+        "swapped. Are they, or are cx and cy?"
+    ),
+    LensDoubt.OFF_CENTRE: N_(
+        "The principal point ({cx:g}, {cy:g}) is far from the middle of the image. Was the lens "
+        "calibrated at another image size, or is the stream cropped?"
+    ),
+    LensDoubt.ASPECT: N_(
+        "fx / fy is {ratio:.2f}; most cameras have square pixels, for which it is 1. Was the lens "
+        "calibrated at another image shape?"
+    ),
+    LensDoubt.FOLDS: N_(
+        "The distortion folds back {px:.0f} px from the principal point. The {percent:.0f} % of "
+        "the image beyond it has no viewing ray: people there are not mapped to the ground."
+    ),
+    LensDoubt.TANGENTIAL: N_(
+        "p1 or p2 is {value:.2g}, unusually large. Is the order k1, k2, p1, p2, k3?"
+    ),
+}
 
 
 class Tone(StrEnum):
@@ -180,6 +210,14 @@ def _looking(lens: Intrinsics, pose: CameraPose, *, typed_angles: bool) -> list[
 
 
 def _through(lens: Intrinsics) -> list[Saying]:
+    asked = [
+        Saying(kind=Tone.WARNING, text=_(_OF_LENS[each.doubt], **each.values), field=each.field)
+        for each in lens_questions(lens)
+    ]
+    return [*_field_of_view(lens), *asked]
+
+
+def _field_of_view(lens: Intrinsics) -> list[Saying]:
     if _NARROW <= lens.hfov_rad <= lens.widest_rad:
         return []
     said = _(

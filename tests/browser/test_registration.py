@@ -57,8 +57,8 @@ def test_fields_that_are_wrong_say_so(page, server):
     fill(page, **LENS, id="Not An Id")
     page.get_by_role("button", name="Add this camera").click()
     page.locator("#id:focus").wait_for()  # the first of them
-    assert "small letters" in page.locator("#id-error").inner_text()
-    assert page.locator("#height_m-error").inner_text().endswith("is needed")
+    assert "lower-case letters" in page.locator("#id-error").inner_text()
+    assert page.locator("#height_m-error").inner_text() == "is required"
     assert page.locator("#height_m").get_attribute("aria-invalid") == "true"
     fill(page, id="corner")
     page.get_by_role("button", name="Add this camera").click()

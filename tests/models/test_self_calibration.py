@@ -52,6 +52,41 @@ def test_a_tape_makes_the_height_known_and_a_slow_site_no_other_tilt(lens):
         assert found.pose.tilt_rad == pytest.approx(POSE.tilt_rad, abs=math.radians(1.0))
 
 
+@pytest.mark.parametrize("boxes", [True, False])
+@pytest.mark.parametrize(
+    ("measured", "tilt_deg", "roll_deg", "height"),
+    [
+        (["height_m"], 1.0, 1.0, 0.05),
+        (["tilt_rad"], 0.71, 1.0, None),  # 1 deg by a sensor and 1 deg by tracks: 1 / sqrt 2
+        (["roll_rad"], 1.0, 0.71, None),
+        (["height_m", "roll_rad"], 1.0, 0.71, 0.05),
+    ],
+)
+def test_measurement_has_its_own_sd(lens, boxes, measured, tilt_deg, roll_deg, height):
+    seen = people(lens)
+    given = {name: getattr(POSE, name) for name in measured}
+    found = self_calibrate(seen if boxes else points(seen), lens, WALK, given)
+    sd = np.sqrt(np.diag(found.covariance))
+    assert np.degrees(sd[:2]) == pytest.approx([tilt_deg, roll_deg], rel=0.04)
+    assert sd[2] <= height if height else sd[2] > 0.12
+    assert (np.abs(found.values - plane_parameters_of(POSE)) <= 2 * sd).all()
+
+
+def test_wrong_measurement_is_weighed_with_the_tracks(lens):
+    """Boxes know the height to 14 %, a tape to 5 %: an error of the tape shrinks by some 12 %."""
+    found = self_calibrate(people(lens), lens, WALK, {"height_m": 1.1 * POSE.height_m})
+    error = found.values[2] - math.log(POSE.height_m)
+    assert 0.75 * math.log(1.1) < error < 0.95 * math.log(1.1)
+
+
+def test_people_who_walk_one_way_tell_the_pose_with_a_measured_angle(lens):
+    seen = points(people(lens, lanes=1, aside_m=0.3))
+    found = self_calibrate(seen, lens, WALK, {"tilt_rad": POSE.tilt_rad})
+    sd = np.sqrt(np.diag(found.covariance))
+    assert found.identifiable == ("tilt", "roll", "height")
+    assert (np.abs(found.values - plane_parameters_of(POSE)) <= 2 * sd).all()
+
+
 def test_who_all_walk_one_way_tell_no_pose_by_their_speeds(lens):
     found = self_calibrate(points(people(lens, lanes=1, aside_m=0.3)), lens, WALK, {})
     assert found.identifiable == ()

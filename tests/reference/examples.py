@@ -35,6 +35,11 @@ from tests.conftest import CAMERA, track
 from tests.service.bench import Bench, moved
 
 EXAMPLES = Path(__file__).parents[2] / "service" / "api" / "examples.json"
+_CALIBRATION = {
+    "mtx": [[1100.0, 0.0, 639.5], [0.0, 1100.0, 359.5], [0.0, 0.0, 1.0]],
+    "dist": [[-0.1, 0.02, 0.0, 0.0, 0.0]],
+    "image_size": [1280, 720],
+}
 _DAY = datetime(2026, 11, 25, 8, tzinfo=UTC)
 _TIME = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|\+00:00)")
 _SECRET = re.compile(
@@ -171,6 +176,7 @@ def _run() -> Iterator[_Run]:
 def _cameras(run: _Run) -> None:
     labels = {"site": "campus/north", "tags": ["nvr-east", "outdoor"]}
     run.ask("POST", "/cameras", CAMERA | labels | {"reference_tracks": 200})
+    run.ask("POST", "/calibrations", _CALIBRATION)
     bench = Bench(run.http, run.settings.model_copy(update={"window_tracks": 20}))
     with bench.store.write() as session:
         register_worker(session, "local-1", 1)

@@ -16,9 +16,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from models.errors import CalibrationError
 from service.api.middleware import pages
-from service.api.middleware.field_errors import field_errors
 from service.errors import FieldError, ServiceError
 from service.store.engines.failures import failure_of
+from service.wording.body_errors import field_errors
 from service.wording.language import N_, _
 
 log = logging.getLogger("surefoot.http")

@@ -107,6 +107,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "GET /webhooks",
         "GET /webhooks/{webhook_id}",
         "GET /webhooks/{webhook_id}/deliveries",
+        "POST /calibrations",
         "POST /cameras",
         "PATCH /cameras/{camera_id}",
         "DELETE /cameras/{camera_id}",

@@ -46,7 +46,7 @@ const PLAIN = {
 export function plainly(reason, zone = document.body.dataset.zone) {
   const words = reason
     .replace(/^[a-z_.]+: /, "")
-    .replace(/, got (\[.*\]|[^,]*)$/, "")
+    .replace(/(, got (\[.*\]|[^,]*)| \(got .*\))$/, "")
     .replace(/\d{4}-\d\d-\d\dT[\d:.]+(Z|[+-]\d\d:\d\d)/g, (at) =>
       new Intl.DateTimeFormat(language === "en" ? "en-GB" : language, { timeZone: zone, dateStyle: "medium", timeStyle: "short" }).format(new Date(at)),
     );

@@ -159,9 +159,12 @@ form.addEventListener("submit", (event) => {
 });
 document.getElementById("tracks").addEventListener("change", sendTracks);
 const file = document.getElementById("file");
-file.addEventListener("change", () =>
-  send(file, "/ui/calibration", "application/octet-stream", (answer) => fill(answer.fields)),
-);
+file.addEventListener("change", () => {
+  const query = new URLSearchParams({ camera: fields().id || fields().name });
+  return send(file, `/ui/calibration?${query}`, "application/octet-stream", (answer) =>
+    fill(answer.fields),
+  );
+});
 
 // A file that was mended and is chosen again is news, too.
 for (const input of form.querySelectorAll('input[type="file"]')) {

@@ -98,7 +98,7 @@ def test_every_form_of_a_pose_is_the_same_pose(http, pose, form):
         (("intrinsics", "width"), 0, "/intrinsics/width"),
         (("intrinsics", "distortion"), [0.1], "/intrinsics/distortion"),
         (("prior_pose",), {"heading_deg": 3.0}, "/prior_pose"),
-        (("prior_pose",), {"height_m": -3.0, "tilt_deg": 10}, "/prior_pose"),
+        (("prior_pose",), {"height_m": -3.0, "tilt_deg": 10}, "/prior_pose/height_m"),
         (("prior_pose",), {"height_m": 3.0, "tilt_deg": 100}, "/prior_pose/tilt_deg"),
         (("prior_pose",), {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "/prior_pose"),
         (("frame_rate_hz",), 0, "/frame_rate_hz"),

@@ -144,9 +144,9 @@ def test_files_carry_the_lens_and_are_read_again(http, kind):
 
 
 def test_a_model_of_another_lens_is_refused_by_name(http):
-    text = written(PoseFormat.ROS).replace("equidistant", "rational_polynomial")
+    text = written(PoseFormat.ROS).replace("equidistant", "scaramuzza")
     answer = http.post("/ui/calibration", content=text.encode())
-    assert "rational_polynomial" in problem(answer, 422, "malformed")["detail"]
+    assert "scaramuzza" in problem(answer, 422, "malformed")["detail"]
 
 
 def test_colmap_and_geojson_know_it():

@@ -157,7 +157,8 @@ def test_site_and_tags_are_typed_and_what_is_none_is_said_beside_its_field(http)
     wrong = preview(http, **{**typed, "site": "campus//", "tags": "out/door", "fx": "{wide}"})
     assert wrong["errors"] == {
         "fx": "a number is needed, got '{wide}'",
-        "site": "names with / between them are needed, such as campus/north, and no #",
+        "site": "names with / between them are needed, such as campus/north, and no # (got "
+        "'campus//')",
         "tags": "a tag is letters, digits and .:-_, 40 at most, which 'out/door' is not",
     }
     assert http.post("/ui/register", json=typed).status_code == 201

@@ -147,3 +147,76 @@ def test_centimetres_in_the_form_are_mended_by_a_button(http):
     fields = {"width": "1920", "height": "1080", "fx": "1000", "tilt_deg": "20"}
     worst = preview(http, **fields, height_m="784")["says"][0]
     assert (worst["field"], worst["value"]) == ("height_m", "7.84")
+
+
+FULL_HD = {**SIZE, "fx": 1500.0, "fy": 1500.0, "cx": 959.5, "cy": 539.5}
+HALF = {"width": 960, "height": 540}
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "reason"),
+    [
+        ({"distortion": [-2.0, 0, 0, 0, 0]}, "distortion",
+         "must not fold back within 540 px of the principal point (got a fold at 408 px; pixels "
+         "beyond it have no viewing ray)"),
+        ({**HALF, "cx": 960.0, "cy": 540.0}, "cx",
+         "must be within the image, -0.5 to 959.5 px (got 960); the lens appears to be of an image "
+         "of 1920 x 1080"),
+        ({"fx": 0}, "fx", "must be at least 1 (got 0)"),
+        ({"fx": "wide"}, "fx", "must be a number (got 'wide')"),
+        ({"width": 1920.5}, "width", "must be a whole number (got 1920.5)"),
+        ({"distortion": [0.1, 0.2, 0.3, 0.4]}, "distortion",
+         "must have 5 numbers, k1, k2, p1, p2, k3 (got 4)"),
+        ({"projection": "omni"}, "projection", "must be 'perspective' or 'fisheye' (got 'omni')"),
+    ],
+)  # fmt: skip
+def test_impossible_lens_is_rejected_by_post_patch_and_form(http, changes, pointer, reason):
+    lens = FULL_HD | changes
+    expected = [{"pointer": f"/intrinsics/{pointer}", "reason": reason}]
+    document = problem(http.post("/cameras", json={**CAMERA, "intrinsics": lens}), 422, "malformed")
+    assert document["errors"] == expected
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    changed = http.patch("/cameras/corner", json={"intrinsics": lens}, headers={"If-Match": "*"})
+    assert problem(changed, 422, "malformed")["errors"] == expected
+    if "got a" in reason or "within the image" in reason:
+        shown = preview(http, **typed(lens), **ANGLES)
+        assert shown["errors"] == {pointer: reason}
+
+
+def typed(lens):
+    """A lens as it is typed into the form."""
+    rows = {**lens, "distortion": ", ".join(map(str, lens.get("distortion", [0])))}
+    return {name: str(value) for name, value in rows.items()}
+
+
+def test_impossible_lens_by_its_form_is_rejected(http):
+    lens = {**SIZE, "fisheye": {"fx": 600.0, "distortion": [-2.0, 0, 0, 0]}}
+    document = problem(http.post("/cameras", json={"id": "c", "lens": lens}), 422, "malformed")
+    assert document["errors"][0]["pointer"] == "/lens/distortion"
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "words"),
+    [
+        ({"cx": 0.0, "cy": 0.0}, "cx", "at a corner of the image. Is the camera matrix transposed"),
+        ({"width": 1280, "height": 720}, "cx", "middle of an image of 1920 x 1080"),
+        ({"width": 1080, "height": 1920}, "width", "if width and height were swapped"),
+        ({"cx": 320.0, "cy": 240.0}, "cx", "(320, 240) is far from the middle"),
+        ({"fy": 700.0}, "fy", "fx / fy is 2.14"),
+        ({"distortion": [-0.28, 0.025, 0.163, 0.001, 0.0]}, "distortion", "p1 or p2 is 0.16"),
+        ({"fx": 600.0, "fy": 600.0, "distortion": [-0.3, 0.1, 0, 0, -0.013]}, "distortion",
+         "folds back 694 px from the principal point. The 38 % of the image"),
+    ],
+)  # fmt: skip
+def test_unlikely_lens_is_questioned_by_post_patch_and_form(http, changes, field, words):
+    lens = FULL_HD | changes
+    made = http.post("/cameras", json={"id": "c", "intrinsics": lens, "prior_pose": POSE})
+    assert made.status_code == 201
+    (asked,) = made.json()["questions"]
+    assert asked["field"] == field
+    assert words in asked["text"]
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    changed = http.patch("/cameras/corner", json={"intrinsics": lens}, headers={"If-Match": "*"})
+    assert asked in changed.json()["questions"]
+    shown = preview(http, **typed(lens), **ANGLES)
+    assert [said["text"] for said in shown["says"] if said["kind"] == "warning"] == [asked["text"]]

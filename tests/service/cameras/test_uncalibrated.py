@@ -77,18 +77,63 @@ def test_too_few_people_are_told_and_cannot_be_agreed_to(street):
     problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
 
 
-def test_what_was_measured_holds(http, settings):
+def test_measured_height_gives_the_sd_of_a_tape(http, settings):
     body = {**BARE, "prior_pose": {"height_m": 6.0}}
-    http.post("/cameras", json=body).raise_for_status()
+    made = http.post("/cameras", json=body).raise_for_status().json()
+    assert (made["prior_pose"], made["measured"]) == (
+        None, {"height_m": 6.0, "tilt_deg": None, "roll_deg": None}
+    )  # fmt: skip
     street = Street(http, settings)
     street.keep_to_lanes(PRIOR, 70)
     found = street.look()["proposed"]
-    assert found["pose"]["height_m"] == pytest.approx(6.0, rel=0.1)
-    assert found["sd"]["height_m"] < 1.0
+    assert found["pose"]["height_m"] == pytest.approx(6.0, rel=0.05)
+    assert found["sd"]["height_m"] <= 0.05 * found["pose"]["height_m"]
     http.patch(
         "/cameras/corner", json={"name": "Another"}, headers={"If-Match": "*"}
     ).raise_for_status()
     assert street.pose()["state"] == "uncalibrated"
+    assert http.get("/cameras/corner").json()["measured"] == made["measured"]
+
+
+def test_patch_takes_measurements_until_there_is_a_prior_pose(street):
+    headers = {"If-Match": "*"}
+    assert street.http.get("/cameras/corner").json()["measured"] is None
+    street.keep_to_lanes(PRIOR, 70)
+    by_people = street.look()["proposed"]
+    assert by_people["sd"]["height_m"] > 0.1 * by_people["pose"]["height_m"]
+    given = {"height_m": 6.0, "roll_deg": 1.0}
+    lens = CAMERA["intrinsics"]
+    for body in ({"prior_pose": given}, {"intrinsics": lens, "prior_pose": given}):
+        changed = street.http.patch("/cameras/corner", json=body, headers=headers)
+        assert changed.raise_for_status().json()["measured"] == {
+            "height_m": 6.0, "tilt_deg": None, "roll_deg": pytest.approx(1.0)
+        }  # fmt: skip
+        assert changed.json()["prior_pose"] is None
+        if "intrinsics" in body:  # another lens: the tracks so far are of the former one
+            street.keep_to_lanes(PRIOR, 70)
+        found = street.look()["proposed"]
+        assert found["sd"]["height_m"] <= 0.05 * found["pose"]["height_m"]
+        assert found["sd"]["roll_deg"] == pytest.approx(0.71, abs=0.03)
+        assert abs(found["pose"]["roll_deg"] - 1.0) < 2 * found["sd"]["roll_deg"]
+    street.http.post("/cameras/corner/pose/agree").raise_for_status()
+    agreed = street.http.get("/cameras/corner").json()
+    assert agreed["measured"] is None
+    assert agreed["prior_pose"]["height_m"] == pytest.approx(found["pose"]["height_m"])
+    again = street.http.patch("/cameras/corner", json={"prior_pose": given}, headers=headers)
+    assert problem(again, 409, "conflict")["detail"] == (
+        "prior_pose: the camera has one; height_m and tilt_deg are both required to replace it "
+        "(got 2 of height_m, tilt_deg, roll_deg)"
+    )
+
+
+def test_measured_height_keeps_its_sd_with_too_few_people(http, settings):
+    http.post("/cameras", json={**BARE, "prior_pose": {"height_m": 6.0}}).raise_for_status()
+    street = Street(http, settings)
+    street.cross(PRIOR, 20)  # all one way
+    found = street.look()["proposed"]
+    assert not found["can_be_agreed"]
+    assert found["sd"]["height_m"] <= 0.055 * found["pose"]["height_m"]
+    assert found["pose"]["height_m"] == pytest.approx(6.0, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -105,8 +150,6 @@ def test_a_prior_pose_that_is_said_later_ends_it(street):
     street.look()
     whole = CAMERA["prior_pose"]
     headers = {"If-Match": "*"}
-    partial = {"prior_pose": {"tilt_deg": 20.0}}
-    problem(street.http.patch("/cameras/corner", json=partial, headers=headers), 422, "malformed")
     changed = street.http.patch("/cameras/corner", json={"prior_pose": whole}, headers=headers)
     assert changed.json()["prior_pose"]["tilt_deg"] == pytest.approx(22.0)
     assert street.pose()["state"] == "learning"

@@ -1,8 +1,11 @@
-"""Files that are made to harm: OpenCV's parser falls over them, the service does not."""
+"""Files that are made to harm: the reader rejects them or is ended, the service goes on."""
 
+import io
 import subprocess
 import sys
+import zipfile
 
+import numpy as np
 import pytest
 
 from service.formats import calibration_file
@@ -28,7 +31,7 @@ NESTED = {
 
 def read_by_itself(body: bytes) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(
-        [sys.executable, "-m", "service.formats.calibration_reader", "5"],
+        [sys.executable, "-m", "service.formats.calibration_reader", "5", ""],
         input=body,
         check=False,
         capture_output=True,
@@ -44,17 +47,38 @@ def test_lists_in_lists_do_not_end_the_service(http, name):
     assert http.get("/healthz").status_code == 200
 
 
+@pytest.mark.parametrize("name", NESTED)
+def test_reader_rejects_deep_nesting_by_itself(name):
+    done = read_by_itself(NESTED[name])
+    assert (done.returncode, b"rejected" in done.stdout) == (0, True), done.stderr
+
+
 def test_a_crash_of_the_reader_is_an_answer_in_words(http, monkeypatch):
-    assert read_by_itself(NESTED["json"]).returncode < 0  # or there is nothing to keep apart
-    monkeypatch.setattr(calibration_file, "MAX_DEPTH", 10**9)
-    document = problem(http.post("/ui/calibration", content=NESTED["json"]), 422, "malformed")
+    with monkeypatch.context() as patched:
+        patched.setattr(calibration_file, "_READER", "service.formats.no_such_reader")
+        document = problem(http.post("/ui/calibration", content=GOOD), 422, "malformed")
     assert "reader ended" in document["detail"]
     assert http.post("/ui/calibration", content=GOOD).status_code == 200
 
 
-def test_more_than_a_calibration_has_is_refused():
-    with pytest.raises(calibration_file.MalformedError, match="bytes"):
-        read_calibration(GOOD + b"# and so on\n" * 100_000)
+def test_larger_file_than_a_calibration_is_rejected():
+    with pytest.raises(calibration_file.MalformedError, match="at most 4194304 bytes"):
+        read_calibration(GOOD + b"# and so on\n" * 400_000)
+
+
+def test_archive_that_unpacks_too_large_is_rejected():
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("cameras.txt", b"#" * 20_000_000)
+    with pytest.raises(calibration_file.MalformedError, match="bytes unpacked"):
+        read_calibration(packed.getvalue())
+
+
+def test_pickled_array_is_not_loaded():
+    packed = io.BytesIO()
+    np.savez(packed, mtx=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(calibration_file.MalformedError, match="mtx.npy: must be an array of num"):
+        read_calibration(packed.getvalue())
 
 
 def test_a_matrix_as_large_as_the_machine_is_refused(http):
@@ -117,7 +141,7 @@ def test_the_reader_is_given_none_of_the_environment(monkeypatch, tmp_path):
     """What the process was started with is all that it could tell: no secrets are in it."""
     monkeypatch.setenv("SUREFOOT_SECRET_KEY", "s3cret")
     shown = tmp_path / "environment"
-    (tmp_path / "cv2.py").write_text(
+    (tmp_path / "yaml.py").write_text(
         f"import os; open({str(shown)!r}, 'w').write(repr(dict(os.environ)))\n"
     )
     monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])

@@ -100,13 +100,13 @@ def test_a_page_says_numbers_and_days_in_german(bench):
 def test_a_form_is_answered_in_german(http):
     typed = {"width": "1920", "height": "-3", "fx": "", "height_m": "12 Fuß", "tilt_deg": "20"}
     wrong = http.post("/ui/preview", json={"fields": typed}, headers=GERMAN).json()["errors"]
-    assert wrong["height"] == "mehr als 0 wird gebraucht, nicht -3"
+    assert wrong["height"] == "muss größer als 0 sein (erhalten: -3)"
     assert wrong["height_m"] == "eine Zahl wird gebraucht, nicht '12 Fuß'"
     typed |= {"height": "1080", "fx": "1100", "height_m": "6,5", "tilt_deg": "-20"}
     says = http.post("/ui/preview", json={"fields": typed}, headers=GERMAN).json()["says"]
     assert says[0]["text"].startswith("Die Kamera schaut 20,0° nach oben, also sind nur 12 % des")
     refused = http.post("/ui/register", json=typed | {"fx": ""}, headers=GERMAN).json()["errors"]
-    assert refused == [{"pointer": "/fx", "reason": "wird gebraucht"}]
+    assert refused == [{"pointer": "/fx", "reason": "ist erforderlich"}]
     # A height that R and t make is too much, and not under the ground, in each language.
     turned = {"form": "matrix", "rotation": "1.5707963 0 0", "translation_m": "0 20000 0"}
     for said in (GERMAN, {}):

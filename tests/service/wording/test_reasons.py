@@ -12,7 +12,7 @@ from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.drift import (
     Drift,
     DriftLimits,
-    DriftVerdict,
+    Verdict,
     MoveProbabilities,
     reason_of_chart,
     reason_of_drift,
@@ -265,7 +265,7 @@ DRIFT = Drift(
 def test_a_verdict_gives_what_is_identifiable_as_its_reason(
     excess, drifted, identifiable, moved, code
 ):
-    verdict = DriftVerdict(streak=0, excess=excess, drifted=drifted)
+    verdict = Verdict(streak=0, excess=excess, drifted=drifted)
     move = MoveProbabilities(moved=moved, parameters={})
     reason = reason_of_drift(
         replace(DRIFT, identifiable=identifiable, move=move), verdict, DriftLimits(**LIMITS)
@@ -279,7 +279,7 @@ def test_a_verdict_gives_what_is_identifiable_as_its_reason(
 
 
 def test_where_nothing_is_told_and_nothing_drifted_a_verdict_is_no_reason():
-    verdict = DriftVerdict(streak=0, excess=0.0, drifted=())
+    verdict = Verdict(streak=0, excess=0.0, drifted=())
     assert reason_of_drift(replace(DRIFT, identifiable=()), verdict, DriftLimits(**LIMITS)) is None
 
 

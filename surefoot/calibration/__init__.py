@@ -1,0 +1,1 @@
+"""Calibration files that people have: one reader for HTTP, pages and Python."""
