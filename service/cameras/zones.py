@@ -95,18 +95,27 @@ def draw_zones(
     on: ZoneOn,
     at: datetime | None,
 ) -> ZonesView:
-    """Keep zones in place of those there were, as drawn at the pose that held at a time, or holds.
+    """Replace the zones of a camera.
+
+    Args:
+        session: of a store.
+        camera_id: the camera.
+        etag: the version that the client read.
+        kind: the format of the document; None is our own JSON.
+        document: as `read_document` made it.
+        on: surface of zones that do not name one.
+        at: when they were drawn, by the pose that held then; None is now.
 
     Raises:
-        NotFoundError: there is no such camera.
-        MalformedError: of the document.
-        PreconditionFailedError: they were drawn anew since the client read them.
+        NotFoundError: unknown camera.
+        MalformedError: the document has no usable zones.
+        PreconditionFailedError: the zones changed since the client read them.
         PreconditionRequiredError: no version was named.
     """
     lens = require_camera(session, camera_id).intrinsics
     record = zones.of_camera(session, camera_id)
     check_version("the zones are", _etag(camera_id, record), etag)
-    drawn = read_zones(kind, document, camera_id, (lens.width, lens.height), on)
+    drawn = read_zones(kind, document, (lens.width, lens.height), on)
     for zone in drawn:
         _check_seen(zone, lens)
     held, now = held_pose(session, camera_id, at), datetime.now(UTC)
@@ -140,7 +149,6 @@ def zones_document(view: ZonesView, kind: ZoneFormat) -> str:
     return write_zones(
         kind,
         record.document if record is not None and own else None,
-        view.camera_id,
         (lens.width, lens.height),
         [each.zone for each in view.zones],
         moved if view.moved else None,
