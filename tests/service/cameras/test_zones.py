@@ -2,6 +2,7 @@
 
 import copy
 import json
+import math
 from datetime import UTC, datetime
 
 import numpy as np
@@ -13,6 +14,7 @@ from sqlalchemy import delete
 
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
 from service.app import create_app
+from service.cameras.held_poses import held_pose
 from service.store.cameras import forget_poses, prior_poses
 from service.store.estimates import EstimateRecord
 from service.store.references import SiteReferenceRecord
@@ -164,7 +166,7 @@ def test_pixels_are_shares_of_the_picture_from_its_edge(corner):
 
 def test_ground_goes_by_the_ground_and_the_scene_by_the_rotation(bench):
     draw(bench.http, GATE, WALL)
-    bench.see(moved(tilt_deg=4, roll_deg=-3), change=5)
+    bench.see(moved(tilt_deg=4, roll_deg=-3), change=5, paths=True)
     answer = bench.http.get(URL).json()
     assert answer["moved"] is True
     gate, wall = answer["zones"]
@@ -185,6 +187,36 @@ def test_ground_goes_by_the_ground_and_the_scene_by_the_rotation(bench):
         assert 0 <= angle < 180
     assert 0 < gate["overlap"] < 1
     assert gate["points"] == GATE["points"]
+
+
+def test_corners_of_a_moved_camera_include_a_heading_that_is_not_determined(bench):
+    """Its standard deviation, 6.3 deg by what is stored, is so many pixels across the image."""
+    draw(bench.http, GATE, WALL)
+    bench.see(moved(tilt_deg=4), change=5)
+    gate, wall = bench.http.get(URL).json()["zones"]
+    with bench.store.read() as session:
+        sd_rad = math.sqrt(held_pose(session, "corner").own[3, 3])
+    assert sd_rad > math.radians(3)
+    (u, v) = wall["points_now"][2]
+    ray = np.array([(u - 639.5) / 1100, (v - 359.5) / 1100, 1.0])
+    down = np.array([0, np.cos(math.radians(26)), np.sin(math.radians(26))])  # about: tilt 22 + 4
+    turned = np.cross(down, ray)
+    across_px = 1100 * sd_rad * np.hypot(*(turned[:2] - ray[:2] * turned[2]))
+    assert wall["sd_px"][2][0] == pytest.approx(across_px, rel=0.05)
+    assert min(major for major, _, _ in gate["sd_px"]) > 50
+
+
+def test_corners_have_an_error_if_the_tracks_determine_nothing(bench):
+    draw(bench.http, GATE)
+    bench.see(moved(tilt_deg=4), unidentifiable=("tilt", "roll", "height"))
+    answer = bench.http.get(URL).json()
+    assert (answer["by"]["drifted"], answer["by"]["estimated"]) == (False, [])
+    assert answer["zones"][0]["points_now"] == GATE["points"]
+    with bench.store.read() as session:
+        sd_rad = np.sqrt(np.diag(held_pose(session, "corner").own))
+    tilt_px = 1100 * sd_rad[0]  # of a corner near the middle, at least
+    assert tilt_px > 5
+    assert all(major > tilt_px for major, _, _ in answer["zones"][0]["sd_px"])
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
