@@ -3,7 +3,7 @@
 Coordinates are shares of the image or, if one of them is above 1, pixels of the camera's `detect`
 stream. Motion masks belong to what the image shows (clocks, trees) and stay as they are.
 
-Source: docs.frigate.video, "Zones"; frigate/util/config.py, `get_relative_coordinates`.
+Source: docs.frigate.video, "Zones"; Frigate 0.16, `get_relative_coordinates`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
