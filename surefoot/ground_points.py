@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from models.geometry.ground import ground_from_pixel, ground_of_rays, pixel_from_ground
-from models.geometry.propagation import error_ellipses, restricted
+from models.geometry.propagation import error_ellipses
 from models.geometry.rotation import Array
 from surefoot.camera import Camera, Pose
-from surefoot.result import Result, parameter_names
+from surefoot.result import Result, served_covariance
 
 
 def ground(
@@ -56,16 +56,15 @@ def ellipses(
     """One-sd ellipses of the places of pixels (u, v) by a result's pose; None above the horizon.
 
     Each is its semi-axes in metres, the major first, and the major's direction in degrees clockwise
-    from +Y. They are of the numbers that are estimated, with their correlations; 95 of 100 true
-    places are within 2.45 of them.
+    from +Y. 95 of 100 true places are within 2.45 of them. They include numbers that the tracks do
+    not determine, such as a heading without paths.
     """
     rays, _ = camera.intrinsics.rays(np.asarray(points, dtype=np.float64).reshape(-1, 2))
 
     def placed(rotation: Array, height_m: float) -> Array:
         return height_m * ground_of_rays(rays, rotation)[0]
 
-    known = restricted(result.posterior.covariance, parameter_names(result))
-    found = error_ellipses(placed, result.pose.in_radians, known)
+    found = error_ellipses(placed, result.pose.in_radians, served_covariance(result))
     return [
         (major, minor, (90.0 - math.degrees(angle)) % 180.0) if math.isfinite(major) else None
         for major, minor, angle in found.tolist()

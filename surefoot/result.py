@@ -7,8 +7,9 @@ from enum import StrEnum
 
 from models.assessment import Assessment, AssessmentLimits, TrackWindow, assess, tracks_a_year
 from models.geometry.pose import PARAMETERS
+from models.geometry.rotation import Array
 from models.monitoring.chart import CLOCK
-from models.monitoring.drift import Drift
+from models.monitoring.drift import Drift, drift_between, served_error
 from models.pose import PosePosterior
 from models.reasons import TracksCode
 from models.tracks.trajectory import by_end
@@ -65,6 +66,17 @@ class Result:
         if name == "heading":  # as the pose, which is within one turn, says it
             at += 360 * round((self.pose.heading_deg - at) / 360)
         return at + math.degrees(low), at + math.degrees(high)
+
+
+def served_covariance(result: Result) -> Array:
+    """Covariance (4, 4) of the error of a result's pose: tilt, roll, log height, heading."""
+    posterior = result.posterior
+    names = parameter_names(result)
+    drift = drift_between(
+        posterior.parameters, posterior.sd, names, posterior.prior, posterior.move
+    )
+    served = result.pose.in_radians
+    return served_error(drift, posterior.prior, posterior.covariance, served, moved=result.moved)
 
 
 def parameter_names(result: Result) -> tuple[str, ...]:

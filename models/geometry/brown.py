@@ -37,7 +37,7 @@ class Brown(NamedTuple):
         into the image; such points are not valid. Infinite where it never folds.
         """
         # d/dr r (1 + k1 r^2 + k2 r^4 + k3 r^6) as a polynomial in s = r^2
-        return first_fold([7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0])
+        return first_fold((7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0))
 
     @property
     def fold_radius(self) -> float:

@@ -37,7 +37,7 @@ class Fisheye(NamedTuple):
     @property
     def max_angle_rad(self) -> float:
         """The angle from the axis up to which rays are known: 88 deg, or where the image folds."""
-        slope = [9 * self.k4, 7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0]  # in theta^2
+        slope = (9 * self.k4, 7 * self.k3, 5 * self.k2, 3 * self.k1, 1.0)  # in theta^2
         return min(MOST_ANGLE_RAD, first_fold(slope))
 
     @property

@@ -16,12 +16,6 @@ _STEP = 1e-5
 Placed = Callable[[Array, float], Array]
 
 
-def restricted(covariance: Array, names: tuple[str, ...]) -> Array:
-    """A covariance (4, 4) of `PARAMETERS` in which only the named ones are uncertain."""
-    named = np.isin(PARAMETERS, names)
-    return np.asarray(np.where(np.outer(named, named), covariance, 0.0))
-
-
 def error_ellipses(placed: Placed, pose: CameraPose, covariance: Array) -> Array:
     """One-sd ellipses (N, 3) of points: both semi-axes, the major first, and its angle in radians.
 

@@ -4,10 +4,20 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from models.geometry.pose import ANGLES, PARAMETERS, CameraPose, PoseParameters
-from models.geometry.rotation import angle_between
+import numpy as np
+
+from models.geometry.pose import (
+    ANGLES,
+    PARAMETERS,
+    CameraPose,
+    PoseParameters,
+    array_of,
+    parameters_apart,
+)
+from models.geometry.rotation import Array, angle_between
 
 LIKELY = 0.5  # likelier than not
+_LOWEST = 0.01  # of the prior pose's height
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,3 +116,29 @@ def pose_after(drift: Drift, prior: CameraPose) -> CameraPose:
         # Within one turn, as a prior pose has to be.
         heading_rad=heading if abs(heading) <= turn else math.fmod(heading, turn),
     )
+
+
+def served_error(
+    drift: Drift, prior: CameraPose, covariance: Array, served: CameraPose, *, moved: bool
+) -> Array:
+    """Second moments (4, 4) of the error of a served pose, in `PARAMETERS`.
+
+    A parameter that the tracks do not determine has its prior value in the served pose. If the
+    camera has moved, the parameter may have changed too, and its error is as large as the posterior
+    allows. If no move is known, that variance counts by the probability of a change.
+
+    Args:
+        drift: of the posterior; its `by` has all parameters.
+        prior: the prior pose.
+        covariance: (4, 4) of the posterior around its mean.
+        served: the served pose.
+        moved: whether the camera counts as moved.
+    """
+    determined = np.isin(PARAMETERS, drift.identifiable)
+    chance = [drift.move.parameters.get(name, 0.0) for name in PARAMETERS]
+    scale = np.sqrt(np.where(determined | moved, 1.0, chance))
+    mean = array_of(prior) + [drift.by.of(name) for name in PARAMETERS]
+    height = PARAMETERS.index("height")
+    mean[height] = math.log(max(prior.height_m + drift.by.height_m, _LOWEST * prior.height_m))
+    missed = parameters_apart(mean, array_of(served))
+    return np.asarray(scale[:, None] * covariance * scale + np.outer(missed, missed))

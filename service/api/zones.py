@@ -14,6 +14,7 @@ from service.api.middleware.dependencies import (
     BodyDep,
     IfMatch,
     ReadDep,
+    StateDep,
     WriteDep,
     media_type_of,
 )
@@ -31,9 +32,11 @@ from service.formats.zone_formats import (
     file_name,
     format_of,
     media_type_of_zones,
-    parsed,
+    read_document,
 )
 from service.formats.zones import MOST_CORNERS, MOST_ZONES
+from service.setting_values import read_camera_names
+from surefoot.bridge.camera_names import camera_id_of
 
 _DIGITS = 3  # of a pixel
 _TYPES = (JSON_TYPE, GEOJSON_TYPE, AXIS_TYPE, YAML_TYPE)
@@ -121,7 +124,14 @@ _ZONE: dict[str, Any] = {
 _OURS = {
     "type": "object",
     "required": ["zones"],
-    "properties": {"zones": {"type": "array", "items": _ZONE, "maxItems": MOST_ZONES}},
+    "properties": {
+        "zones": {"type": "array", "items": _ZONE, "maxItems": MOST_ZONES},
+        "size": {
+            **_POINT,
+            "description": "width and height in pixels of the image that `points` are of",
+        },
+        "normalised": {"type": "boolean", "description": "`points` are shares of the image"},
+    },
 }
 _DESCRIBED_BODY = {
     "requestBody": {
@@ -165,6 +175,7 @@ def put(
     request: Request,
     body: BodyDep,
     session: WriteDep,
+    state: StateDep,
     response: Response,
     if_match: IfMatch = None,
     format_: _Format = None,
@@ -173,9 +184,9 @@ def put(
         Moment | None, Query(description="when they were drawn, by the pose that held; now")
     ] = None,
 ) -> ZonesOut:
-    """Keep zones in place of those there were: our JSON, GeoJSON, Frigate's or Axis' configuration.
+    """Replace the zones: by our JSON, GeoJSON, or a configuration of Frigate or Axis.
 
-    The media type says which, or `format` of what is sent as plain JSON.
+    The media type selects the format; of plain JSON `format` does.
     """
     media_type = media_type_of(request)
     if media_type not in _TYPES:
@@ -183,7 +194,10 @@ def put(
             f"Content-Type: one of {', '.join(_TYPES)} is needed, got {media_type or 'none'}"
         )
     kind = format_of(format_, media_type)
-    document = parsed(body, media_type)
+    names = read_camera_names(state.settings.mqtt_cameras)
+    document = read_document(
+        kind, body, media_type, camera_id, lambda name: camera_id_of(name, names)
+    )
     view = zones.draw_zones(session, camera_id, if_match, kind, document, on, drawn_at)
     response.headers["ETag"] = view.etag
     return ZonesOut.from_value(view)

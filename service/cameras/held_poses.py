@@ -11,23 +11,25 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.geometry.pose import PARAMETERS, CameraPose
-from models.geometry.propagation import restricted
 from models.geometry.rotation import Array
+from models.monitoring.drift import served_error
 from service.enums import PoseState
+from service.reasons import ServiceCode
 from service.store import alerts, cameras, estimates, zones
 from service.store.cameras import PriorPoseRecord
 from service.store.estimates import EstimateRecord
+from service.store.zones import ZonesRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeldPose:
     """A pose that held `since` a time.
 
-    `identifiable` names the numbers that tracks tell; `own` is their covariance (4, 4) against the
-    prior pose, None where no estimate says one. `prior` is the covariance of the prior pose, where
-    that is one that was estimated and accepted. Where the camera has `drifted` and nothing is
-    identifiable, nobody knows where it stands: it is the prior pose, and wrong. One that is
-    `assumed` is usual somewhere, and nobody has agreed to it: nobody is served by it.
+    `identifiable` names the parameters that the tracks determine. `own` is the covariance (4, 4) of
+    the pose's error relative to the prior pose, with those that they do not determine; None without
+    an estimate. `prior` is the covariance of the prior pose, if that was estimated and accepted. If
+    the camera has `drifted` and nothing is identifiable, its pose is unknown: `pose` is the prior
+    pose, and wrong. An `assumed` pose is a usual one that nobody has confirmed.
     """
 
     pose: CameraPose
@@ -58,17 +60,22 @@ def held_pose(session: Session, camera_id: str, at: datetime | None = None) -> H
         return _held(prior, since=prior.created_at)
     drift = alerts.drift_at(session, camera_id, at)
     if drift is None:
-        last = estimates.standing_at(session, camera_id, prior.id, at.timestamp())
-        if last is None or last.state in (PoseState.UNSURE, PoseState.LEARNING):
-            return _held(prior, since=prior.created_at)
+        last = estimates.last_at(session, camera_id, prior.id, at.timestamp(), drifting=False)
         return _held(prior, last, since=prior.created_at)
     moved_s = None if drift.changed_at is None else drift.changed_at.timestamp()
-    found = estimates.of_drift(session, camera_id, moved_s, drift.resolved_at, at.timestamp())
+    found = estimates.of_drift(
+        session, camera_id, moved_s, drift.resolved_at, at.timestamp()
+    ) or estimates.last_at(session, camera_id, prior.id, at.timestamp(), drifting=True)
     since = drift.changed_at or drift.opened_at
     if found is None:
         return _held(prior, since=since, drifted=True)
     prior = session.get_one(PriorPoseRecord, found.prior_pose_id)
     return _held(prior, found, since=since, drifted=True)
+
+
+def drawn_since_move(record: ZonesRecord, held: HeldPose) -> bool:
+    """True if zones were drawn while the camera was already where it is now, after a move."""
+    return held.drifted and record.covariance is not None and record.drawn_at >= held.since
 
 
 def keep_drawn(session: Session, camera_id: str, held: HeldPose) -> None:
@@ -85,8 +92,7 @@ def keep_drawn(session: Session, camera_id: str, held: HeldPose) -> None:
     record = zones.of_camera(session, camera_id)
     if record is None:
         return
-    since_drift = held.drifted and record.covariance is not None and record.drawn_at >= held.since
-    if held.assumed or since_drift:
+    if held.assumed or drawn_since_move(record, held):
         prior = cameras.prior_pose(session, camera_id)
         record.prior_pose_id, record.pose, record.covariance = prior.id, asdict(prior.pose), None
 
@@ -97,6 +103,11 @@ def _four(covariance: list[list[float]]) -> Array:
     return np.pad(known, (0, len(PARAMETERS) - len(known)))
 
 
+def _learns_reference(estimate: EstimateRecord) -> bool:
+    """True while nothing is judged: the camera is taken to be where it was registered."""
+    return any(each.code == ServiceCode.LEARNING_REFERENCE for each in estimate.reasons)
+
+
 def _held(
     prior: PriorPoseRecord,
     estimate: EstimateRecord | None = None,
@@ -104,17 +115,21 @@ def _held(
     since: datetime,
     drifted: bool = False,
 ) -> HeldPose:
-    names = () if estimate is None else tuple(estimate.identifiable)
-    own = None if estimate is None else restricted(np.array(estimate.covariance), names)
-    pose = prior.pose
+    pose, own = prior.pose, None
+    names: tuple[str, ...] = ()
     if estimate is not None and drifted:
         pose = replace(pose, **asdict(estimate.pose))
+    if estimate is not None and not _learns_reference(estimate):
+        covariance = np.array(estimate.covariance)
+        own = served_error(estimate.drift, prior.pose, covariance, pose, moved=drifted)
+        if estimate.state not in (PoseState.UNSURE, PoseState.LEARNING):
+            names = tuple(estimate.identifiable)
     return HeldPose(
         pose=pose,
         drifted=drifted,
         since=since,
         identifiable=names,
-        own=own if names else None,
+        own=own,
         prior=None if prior.covariance is None else _four(prior.covariance),
         prior_pose_id=prior.id,
         assumed=prior.assumed,

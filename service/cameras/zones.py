@@ -9,11 +9,12 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.outlines import MovedOutline, View, moved_outline, within_picture
+from models.geometry.outlines import MovedOutline, View, moved_outlines, within_picture
+from models.geometry.pose import PARAMETERS
 from models.geometry.rotation import Array
 from service.access.activity import note
 from service.cameras.cameras import require_camera
-from service.cameras.held_poses import HeldPose, held_pose
+from service.cameras.held_poses import HeldPose, drawn_since_move, held_pose
 from service.enums import Activity, ZoneOn
 from service.errors import MalformedError, check_version
 from service.formats.zone_formats import ZoneFormat, is_cut, read_zones, write_zones
@@ -67,20 +68,21 @@ def view_zones(session: Session, camera_id: str) -> ZonesView:
         now = View(intrinsics=lens, pose=drawn.pose)
     moved = drawn != now
     covariance = None if record is None else _between(session, record, held, moved=moved)
-    found = []
-    outlines = {} if record is None else record.outlines
-    for zone in () if record is None else zones_of_record(record):
-        outline = outlines[zone.id]
-        placed = moved_outline(outline, now, covariance)
-        if not moved:
-            placed = _unmoved(outline.corners, placed)
-        found.append(ZoneView(zone=zone, now=placed))
+    outlines = [] if record is None else list(record.outlines.values())
+    placed = moved_outlines(outlines, now, covariance)
+    if not moved:
+        placed = [
+            _unmoved(outline.corners, each) for outline, each in zip(outlines, placed, strict=True)
+        ]
+    drawn_zones = () if record is None else zones_of_record(record)
     return ZonesView(
         camera_id=camera_id,
         record=record,
         intrinsics=lens,
         held=held,
-        zones=tuple(found),
+        zones=tuple(
+            ZoneView(zone=zone, now=each) for zone, each in zip(drawn_zones, placed, strict=True)
+        ),
         moved=moved,
         shift_m=float(np.linalg.norm(now.pose.centre_m - drawn.pose.centre_m)),
     )
@@ -95,18 +97,27 @@ def draw_zones(
     on: ZoneOn,
     at: datetime | None,
 ) -> ZonesView:
-    """Keep zones in place of those there were, as drawn at the pose that held at a time, or holds.
+    """Replace the zones of a camera.
+
+    Args:
+        session: of a store.
+        camera_id: the camera.
+        etag: the version that the client read.
+        kind: the format of the document; None is our own JSON.
+        document: as `read_document` made it.
+        on: surface of zones that do not name one.
+        at: when they were drawn, by the pose that held then; None is now.
 
     Raises:
-        NotFoundError: there is no such camera.
-        MalformedError: of the document.
-        PreconditionFailedError: they were drawn anew since the client read them.
+        NotFoundError: unknown camera.
+        MalformedError: the document has no usable zones.
+        PreconditionFailedError: the zones changed since the client read them.
         PreconditionRequiredError: no version was named.
     """
     lens = require_camera(session, camera_id).intrinsics
     record = zones.of_camera(session, camera_id)
     check_version("the zones are", _etag(camera_id, record), etag)
-    drawn = read_zones(kind, document, camera_id, (lens.width, lens.height), on)
+    drawn = read_zones(kind, document, (lens.width, lens.height), on)
     for zone in drawn:
         _check_seen(zone, lens)
     held, now = held_pose(session, camera_id, at), datetime.now(UTC)
@@ -140,7 +151,6 @@ def zones_document(view: ZonesView, kind: ZoneFormat) -> str:
     return write_zones(
         kind,
         record.document if record is not None and own else None,
-        view.camera_id,
         (lens.width, lens.height),
         [each.zone for each in view.zones],
         moved if view.moved else None,
@@ -178,10 +188,10 @@ def _check_seen(zone: Zone, lens: Intrinsics) -> None:
 
 
 def _between(session: Session, record: ZonesRecord, held: HeldPose, *, moved: bool) -> Array | None:
-    """The covariance of a pose against that of a drawing; None where nothing says one.
+    """The covariance of a pose relative to that of a drawing; None if none is known.
 
-    Of an earlier prior pose, its error and that of today's are taken for independent, which at
-    worst counts the first one twice.
+    The errors of an earlier prior pose and of today's count as independent, which at worst counts
+    the first one twice.
     """
     parts = [held.own]
     if moved:
@@ -190,7 +200,13 @@ def _between(session: Session, record: ZonesRecord, held: HeldPose, *, moved: bo
         drawn_at = session.get_one(PriorPoseRecord, record.prior_pose_id).covariance
         parts += [held.prior, None if drawn_at is None else np.array(drawn_at)]
     known = [each for each in parts if each is not None]
-    return sum(known[1:], known[0]) if known else None
+    if not known:
+        return None
+    if drawn_since_move(record, held):
+        # What the tracks do not determine is the same as at the drawing.
+        told = np.isin(PARAMETERS, held.identifiable)
+        known = [np.where(np.outer(told, told), each, 0.0) for each in known]
+    return sum(known[1:], known[0])
 
 
 def _etag(camera_id: str, record: ZonesRecord | None) -> str:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 
 from models.geometry.crossings import Steps, crossings
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.outlines import View, moved_outline
+from models.geometry.outlines import View, moved_outlines
 from models.geometry.pose import CameraPose
 from models.tracks.trajectory import Trajectory
 from service.enums import ZoneOn
@@ -53,8 +53,9 @@ def moved_zones(
         return None
     steps = Steps.of([track.uv for track in tracks])
     found = []
-    for name, outline in record.outlines.items():
-        placed = moved_outline(outline, now, None)
+    outlines = record.outlines
+    moved = moved_outlines(list(outlines.values()), now, None)
+    for (name, outline), placed in zip(outlines.items(), moved, strict=True):
         told = None if outline.closed else crossings(steps, outline.corners, placed.corners)
         found.append(
             MovedZone(

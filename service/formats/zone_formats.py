@@ -1,4 +1,4 @@
-"""Zones in the documents of other systems, by name: read, and written anew with other corners."""
+"""Zones in the documents of other systems: read, and written back with other corners."""
 
 import copy
 import json
@@ -7,17 +7,21 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-import yaml
-
 from service.enums import ZoneOn
-from service.errors import MalformedError, TooLargeError
-from service.formats.zones import Corner, Slot, Zone, refused, zones_of
+from service.errors import MalformedError, TooLargeError, UnsupportedMediaTypeError
+from service.formats.nesting import check_levels
+from service.formats.scaling import Scaling, read_scaling
+from service.formats.yaml_text import MAX_BYTES, read_yaml_text
+from service.formats.zones import Corner, Slot, Zone, refused, scaled, scaling_of, zones_of
 from service.formats.zones_axis import axis_slots, axis_template
-from service.formats.zones_frigate import frigate_slots, frigate_template
+from service.formats.zones_frigate import (
+    FrigateText,
+    frigate_document,
+    frigate_slots,
+    frigate_template,
+)
 from service.formats.zones_geojson import geojson_slots, geojson_template
 
-_MOST_YAML = 64 * 1024  # bytes: PyYAML holds every thread up meanwhile
-_DEEPEST = 32  # levels; Frigate's have seven
 JSON_TYPE, YAML_TYPE = "application/json", "application/yaml"
 GEOJSON_TYPE, AXIS_TYPE = "application/geo+json", "application/vnd.surefoot.axis-zones+json"
 
@@ -30,55 +34,82 @@ class ZoneFormat(StrEnum):
     AXIS = "axis"
 
 
+def _shares(document: Any, picture: tuple[int, int]) -> Scaling | None:
+    return read_scaling(None, True, picture)
+
+
+def _axis_scaling(document: Any, picture: tuple[int, int]) -> Scaling | None:
+    width, height = picture
+    return Scaling(factor=(width / 2, -height / 2), shift=((width - 1) / 2, (height - 1) / 2))
+
+
+def _json_text(document: Any) -> str:
+    return json.dumps(document, ensure_ascii=False)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Form:
-    """A format; `to` and `of` are from its numbers to pixels and back, of pictures of a size."""
+    """A format: how a kept document is opened, its zones are found, and it becomes text again.
+
+    `scaling` is from the numbers of a document to pixels of an image of a size; `cut` is true if a
+    document must not have corners outside the image.
+    """
 
     media_type: str
     ending: str
-    slots: Callable[[Any, str], Iterator[Slot]]
+    open: Callable[[Any], Any]
+    slots: Callable[[Any], Iterator[Slot]]
+    text: Callable[[Any], str]
     template: Callable[[Sequence[Zone]], Any]
-    to: Callable[[Corner, int, int], Corner]
-    of: Callable[[Corner, int, int], Corner]
-    cut: bool  # whether nothing may be outside the picture
+    scaling: Callable[[Any, tuple[int, int]], Scaling | None]
+    cut: bool
 
 
 _FORMS = {
     ZoneFormat.FRIGATE: _Form(
         media_type=YAML_TYPE,
         ending="yml",
+        open=FrigateText.of,
         slots=frigate_slots,
+        text=lambda opened: opened.yaml.edited(),
         template=frigate_template,
-        to=lambda at, w, h: (at[0] * w - 0.5, at[1] * h - 0.5),
-        of=lambda at, w, h: ((at[0] + 0.5) / w, (at[1] + 0.5) / h),
+        scaling=_shares,
         cut=True,
     ),
     ZoneFormat.GEOJSON: _Form(
         media_type=GEOJSON_TYPE,
         ending="geojson",
+        open=copy.deepcopy,
         slots=geojson_slots,
+        text=_json_text,
         template=geojson_template,
-        to=lambda at, w, h: at,
-        of=lambda at, w, h: at,
+        scaling=scaling_of,
         cut=False,
     ),
     ZoneFormat.AXIS: _Form(
         media_type=AXIS_TYPE,
         ending="axis.json",
+        open=copy.deepcopy,
         slots=axis_slots,
+        text=_json_text,
         template=axis_template,
-        to=lambda at, w, h: ((at[0] + 1) / 2 * w - 0.5, (1 - at[1]) / 2 * h - 0.5),
-        of=lambda at, w, h: (2 * (at[0] + 0.5) / w - 1, 1 - 2 * (at[1] + 0.5) / h),
+        scaling=_axis_scaling,
         cut=True,
     ),
 }
 
 
-def format_of(said: ZoneFormat | None, media_type: str) -> ZoneFormat | None:
-    """The format of a document: as it is said, else by its media type; None is our own."""
-    return said or next(
-        (kind for kind in ZoneFormat if _FORMS[kind].media_type == media_type), None
-    )
+def format_of(named: ZoneFormat | None, media_type: str) -> ZoneFormat | None:
+    """The format of a body: the named one, else the one of its media type; None is our own.
+
+    Raises:
+        UnsupportedMediaTypeError: the named format has another media type.
+    """
+    by_type = next((kind for kind in ZoneFormat if _FORMS[kind].media_type == media_type), None)
+    if named and by_type and named != by_type:
+        needed = f"{_FORMS[named].media_type} or {JSON_TYPE} is needed for format={named}"
+        raise UnsupportedMediaTypeError(f"Content-Type: {needed}, got {media_type}")
+    return named or by_type
 
 
 def is_cut(kind: ZoneFormat) -> bool:
@@ -96,90 +127,116 @@ def file_name(kind: ZoneFormat, camera_id: str) -> str:
     return f"{camera_id}-zones.{_FORMS[kind].ending}"
 
 
-def parsed(body: bytes, media_type: str) -> Any:
-    """The value of a body, of YAML where its type says so.
+def read_document(
+    kind: ZoneFormat | None,
+    body: bytes,
+    media_type: str,
+    camera_id: str,
+    camera_id_of: Callable[[str], str],
+) -> Any:
+    """The document in a body, as it is kept.
+
+    Args:
+        kind: its format; None is our own JSON.
+        body: of the request.
+        media_type: of the body.
+        camera_id: whose zones are wanted.
+        camera_id_of: maps a camera's name in another system to a camera id.
 
     Raises:
-        MalformedError: it is neither.
-        TooLargeError: more YAML than may be.
+        MalformedError: the body is not of its media type, or nested too deep.
+        TooLargeError: more YAML than `MAX_BYTES`.
     """
+    if kind == ZoneFormat.FRIGATE:
+        return frigate_document(_yaml_text(body, media_type), camera_id, camera_id_of)
+    return _json_value(body)
+
+
+def _yaml_text(body: bytes, media_type: str) -> str:
+    if len(body) > MAX_BYTES:
+        raise TooLargeError(
+            f"body: at most {MAX_BYTES} bytes of YAML are accepted, got {len(body)}"
+        )
+    if media_type != YAML_TYPE:  # JSON is YAML, once tabs are blanks
+        return json.dumps(_json_value(body), ensure_ascii=False, indent=2)
     try:
-        if media_type != YAML_TYPE:
-            return _plain(json.loads(body))
-        if len(body) > _MOST_YAML:
-            words = f"at most {_MOST_YAML} bytes of YAML are taken, got {len(body)}"
-            raise TooLargeError(f"body: {words}")
-        _check_yaml(body)
-        return _plain(yaml.safe_load(body))
-    except (ValueError, TypeError, RecursionError, yaml.YAMLError) as error:
-        what = "YAML with keys that are text" if media_type == YAML_TYPE else "JSON"
-        raise MalformedError(f"body: {what} is needed, {str(error):.100}") from error
+        return read_yaml_text(body)
+    except ValueError as error:
+        raise MalformedError(f"body: YAML is needed, {str(error):.200}") from error
 
 
-def _check_yaml(body: bytes) -> None:
-    """Refuse what is small as text alone.
-
-    A few hundred bytes of aliases are gigabytes once they are written out, and brackets within
-    brackets take the square of their number: 64 KiB of them half an hour.
-    """
-    depth = 0
-    for event in yaml.parse(body, Loader=yaml.CSafeLoader):
-        if isinstance(event, yaml.AliasEvent):
-            raise ValueError("aliases are not taken")
-        depth += isinstance(event, yaml.CollectionStartEvent)
-        depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST:
-            raise ValueError(f"at most {_DEEPEST} levels are taken")
-
-
-def _plain(value: Any) -> Any:
-    """A value of what JSON has: no NaN, no half of a surrogate pair, no time and no bytes."""
-    text = json.dumps(value, ensure_ascii=False, allow_nan=False)
-    return json.loads(text.encode())
+def _json_value(body: bytes) -> Any:
+    """A JSON value that can be written again: no NaN, no half of a surrogate pair."""
+    try:
+        value = json.loads(body)
+        check_levels(value)
+        json.dumps(value, ensure_ascii=False, allow_nan=False).encode()
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deep" if isinstance(error, RecursionError) else f"{error!s:.100}"
+        raise MalformedError(f"body: JSON is needed, {reason}") from error
+    return value
 
 
 def read_zones(
-    kind: ZoneFormat | None, document: Any, camera_id: str, picture: tuple[int, int], on: ZoneOn
+    kind: ZoneFormat | None, document: Any, picture: tuple[int, int], on: ZoneOn
 ) -> tuple[Zone, ...]:
-    """The zones of a document, in pixels of a picture of a size.
+    """The zones of a document, in pixels of an image of a size.
 
     Raises:
-        MalformedError: with the place, what is needed and what came.
+        MalformedError: with the place, what is needed and what was received; or the document
+            cannot be written back with the same zones.
     """
     if kind is None:
-        return zones_of(_own_slots(document), on, lambda at: at, picture)
+        return zones_of(_own_slots(document), on, scaling_of(document, picture), picture)
     form = _FORMS[kind]
-    return zones_of(form.slots(document, camera_id), on, lambda at: form.to(at, *picture), picture)
+    slots = form.slots(form.open(document))
+    found = zones_of(slots, on, form.scaling(document, picture), picture)
+    _check_written(kind, document, picture, found)
+    return found
+
+
+def _check_written(
+    kind: ZoneFormat, document: Any, picture: tuple[int, int], zones: Sequence[Zone]
+) -> None:
+    """Write a document once before it is kept: later there is nobody to refuse it to."""
+    corners = {zone.id: zone.corners for zone in zones}
+    form = _FORMS[kind]
+    written = write_zones(kind, document, picture, zones, corners)
+    again = {**document, "text": written} if kind == ZoneFormat.FRIGATE else json.loads(written)
+    if [slot.id for slot in form.slots(form.open(again))] != list(corners):
+        raise refused("", "these zones cannot be written back")
 
 
 def write_zones(
     kind: ZoneFormat,
     document: Any,
-    camera_id: str,
     picture: tuple[int, int],
     zones: Sequence[Zone],
     moved: Mapping[str, Sequence[Corner]] | None,
 ) -> str:
-    """The text of a document with zones where they are now; what is not a zone stays as it is.
+    """The text of a document with zones where they are now; the rest of it stays as it is.
 
-    `document` is as it came, if it came in this format. `moved` has, by their ids, the corners that
-    zones have by now, in pixels: without any, a zone is left out. None where nothing has moved: the
-    document is as it came.
+    Args:
+        kind: the format.
+        document: as `read_document` made it; None if the zones came in another format.
+        picture: width and height of the image.
+        zones: as they were drawn.
+        moved: corners in pixels by zone id. A zone with too few is left out. None if the camera
+            has not moved: the document is as it came.
     """
     form = _FORMS[kind]
-    made = copy.deepcopy(form.template(zones) if document is None else document)
+    opened = form.open(form.template(zones) if document is None else document)
     if document is None or moved is not None:
         corners = {zone.id: zone.corners for zone in zones} if moved is None else moved
         fewest = {zone.id: min(len(zone.corners), 3) for zone in zones}  # a line has two
-        for slot in list(form.slots(made, camera_id)):
+        scaling = form.scaling(document, picture)
+        for slot in list(form.slots(opened)):
             found = corners.get(slot.id, ())
             if len(found) < fewest[slot.id]:
                 slot.drop()
             else:
-                slot.put([form.of(each, *picture) for each in found])
-    if form.media_type == YAML_TYPE:
-        return str(yaml.safe_dump(made, sort_keys=False, allow_unicode=True, width=1_000_000))
-    return json.dumps(made, ensure_ascii=False)
+                slot.put(scaled(found, scaling, back=True))
+    return form.text(opened)
 
 
 def _own_slots(document: Any) -> Iterator[Slot]:

@@ -6,6 +6,8 @@ from typing import Any
 
 from service.enums import ZoneOn
 from service.errors import FieldError, MalformedError
+from service.formats.scaling import Scaling, read_scaling
+from service.formats.zone_extent import extent_fault
 
 MOST_ZONES, MOST_CORNERS = 100, 2_000  # of a camera; corners of all together
 _LONGEST_ID = 100
@@ -39,23 +41,50 @@ class Slot:
 
 
 def refused(pointer: str, reason: str) -> MalformedError:
-    """The error of something in a document."""
+    """The error of a place in a document."""
     words = f"{pointer[1:] or 'body'}: {reason}"
     return MalformedError(words, (FieldError(pointer=pointer, reason=reason),))
 
 
+def scaling_of(document: Any, picture: tuple[int, int]) -> Scaling | None:
+    """How the numbers of a JSON document become pixels, by its `size` or `normalised`.
+
+    Raises:
+        MalformedError: one of the two fields is malformed.
+    """
+    given = document if isinstance(document, dict) else {}
+    try:
+        return read_scaling(given.get("size"), given.get("normalised"), picture)
+    except ValueError as error:
+        field, _, reason = str(error).partition(": ")
+        raise refused(f"/{field}", reason) from error
+
+
+def scaled(
+    corners: Sequence[Corner], scaling: Scaling | None, *, back: bool = False
+) -> list[Corner]:
+    """Corners in pixels of the image; with `back`, pixels in the numbers of the document."""
+    if scaling is None:
+        return list(corners)
+    (fx, fy), (sx, sy) = scaling.factor, scaling.shift
+    if back:
+        return [((u - sx) / fx, (v - sy) / fy) for u, v in corners]
+    return [(x * fx + sx, y * fy + sy) for x, y in corners]
+
+
 def zones_of(
-    slots: Iterable[Slot],
-    on: ZoneOn,
-    to_pixel: Callable[[Corner], Corner],
-    picture: tuple[int, int],
+    slots: Iterable[Slot], on: ZoneOn, scaling: Scaling | None, picture: tuple[int, int]
 ) -> tuple[Zone, ...]:
     """The zones of a document.
 
-    They lie `on` what is named where it does not say.
+    Args:
+        slots: places of zones in the document.
+        on: surface of a zone that does not name one.
+        scaling: from the document's numbers to pixels; None if they are pixels.
+        picture: width and height of the image.
 
     Raises:
-        MalformedError: with the place, the limit and what came.
+        MalformedError: with the place, the limit and the value received.
     """
     zones: dict[str, Zone] = {}
     count = 0
@@ -64,21 +93,20 @@ def zones_of(
             needed = f"an id of 1 to {_LONGEST_ID} characters is needed"
             raise refused(slot.pointer, f"{needed}, got {slot.id!r:.40}")
         if slot.id in zones:
-            raise refused(slot.pointer, f"each zone has an id of its own, got {slot.id!r} twice")
+            raise refused(slot.pointer, f"each zone needs its own id, got {slot.id!r} twice")
         if slot.on is not None and slot.on not in list(ZoneOn):
             needed = f"on: one of {', '.join(ZoneOn)} is needed"
             raise refused(slot.pointer, f"{needed}, got {slot.on!r:.40}")
-        corners = tuple(to_pixel(each) for each in _numbers(slot))
-        for corner in corners:
-            if not all(-side <= x <= 2 * side for x, side in zip(corner, picture, strict=True)):
-                needed = f"corners within a picture's size of it, {picture}, are needed"
-                got = f"{corner[0]:.6g}, {corner[1]:.6g}"
-                raise refused(slot.pointer, f"{needed}, got pixel {got}")
-        zones[slot.id] = Zone(id=slot.id, on=ZoneOn(slot.on or on), corners=corners)
-        count += len(corners)
-        if len(zones) > MOST_ZONES or count > MOST_CORNERS:
-            most = f"at most {MOST_ZONES} zones with {MOST_CORNERS} corners together are taken"
+        given = _numbers(slot)
+        count += len(given)
+        if len(zones) >= MOST_ZONES or count > MOST_CORNERS:
+            most = f"at most {MOST_ZONES} zones with {MOST_CORNERS} corners together are accepted"
             raise refused(slot.pointer, f"{most}, got more")
+        corners = tuple(scaled(given, scaling))
+        reason = extent_fault(given, corners, picture)
+        if reason is not None:
+            raise refused(slot.pointer, reason)
+        zones[slot.id] = Zone(id=slot.id, on=ZoneOn(slot.on or on), corners=corners)
     return tuple(zones.values())
 
 

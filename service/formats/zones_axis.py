@@ -15,7 +15,7 @@ _DIGITS = 5
 _KINDS = (("scenarios", "vertices"), ("profiles", "data"))
 
 
-def axis_slots(document: Any, camera_id: str) -> Iterator[Slot]:
+def axis_slots(document: Any) -> Iterator[Slot]:
     """The areas and lines of all scenarios; one with several has them numbered from the second."""
     part, pointer = document, ""
     for wrapper in ("data", "params"):

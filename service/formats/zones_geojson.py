@@ -6,14 +6,16 @@ from typing import Any
 from service.formats.zones import Corner, Slot, Zone, refused
 
 _DIGITS = 3
-_AREA, _LINE = "Polygon", "LineString"
+_AREA, _LINE, _UNIT = "Polygon", "LineString", "pixel"
 
 
-def geojson_slots(document: Any, camera_id: str) -> Iterator[Slot]:
+def geojson_slots(document: Any) -> Iterator[Slot]:
     """The features of a collection; a ring ends where it began."""
     features = document.get("features") if isinstance(document, dict) else None
     if not isinstance(features, list):
         raise refused("/features", "GeoJSON's features are needed, a list")
+    if document.get("unit", _UNIT) != _UNIT:  # metres of the ground, which the pose comes in
+        raise refused("/unit", f"{_UNIT} is needed, got {document['unit']!r:.40}")
     for number, feature in enumerate(list(features)):
         pointer = f"/features/{number}"
         shape = feature.get("geometry") if isinstance(feature, dict) else None
@@ -44,7 +46,7 @@ def geojson_template(zones: Sequence[Zone]) -> Any:
         }
         for zone in zones
     ]
-    return {"type": "FeatureCollection", "crs": None, "unit": "pixel", "features": features}
+    return {"type": "FeatureCollection", "crs": None, "unit": _UNIT, "features": features}
 
 
 def _corners(shape: Any, pointer: str) -> Any:

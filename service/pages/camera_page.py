@@ -18,6 +18,7 @@ from service.alerts.data_gaps import DataGap, data_gap_of
 from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.cameras.cameras import CameraView, view_camera
+from service.cameras.held_poses import drawn_since_move
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import image_facts, stood_at
 from service.cameras.sources import SourceView, rival_sources
@@ -44,7 +45,13 @@ from service.wording.camera import CameraFacts
 from service.wording.language import _
 from service.wording.reasons import in_words
 from service.wording.times import Clock
-from service.wording.zones import apply_words, corner_words, count_words, zone_words
+from service.wording.zones import (
+    apply_words,
+    corner_words,
+    count_words,
+    undetermined_words,
+    zone_words,
+)
 
 _TRACKS = 120  # more are a carpet
 _ALERTS, _ACTIVITY, _TRAININGS, _PRIORS, _PAST_WINDOWS = 50, 40, 5, 20, 5
@@ -245,6 +252,7 @@ def show(
         ),
         proposed=moves.proposed_rows(proposal.pose, proposal.sd) if proposal else None,
         zones=_zone_rows(page.zones, _counts(page)),
+        undetermined=_undetermined(page.zones),
         applied=apply_words(page.zones.record.form if page.zones.record else None),
         frigate=_frigate(state.settings, page.zones),
         parameters=moves.parameter_rows(
@@ -298,7 +306,7 @@ def _undo(page: CameraPage, caller: Caller | None) -> UndoWords | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZoneRow:
-    """A zone in words: what a move comes to for it, whom it counted, how sure its corners are.
+    """A zone in words: the effect of a move, counts of a line, the error of its corners.
 
     Any may be empty.
     """
@@ -326,18 +334,22 @@ def _counts(page: CameraPage) -> dict[str, str]:
 def _zone_rows(view: ZonesView, counts: Mapping[str, str]) -> list[ZoneRow]:
     rows = []
     for each in view.zones:
-        said = {}
+        sizes = [] if each.now.ellipses is None else each.now.ellipses[:, 0].tolist()
+        worst_px = max((size for size in sizes if math.isfinite(size)), default=None)
+        words = {"sure": corner_words(worst_px)}
         if view.moved:
-            sizes = [] if each.now.ellipses is None else each.now.ellipses[:, 0].tolist()
-            worst_px = max((size for size in sizes if math.isfinite(size)), default=None)
             shares = {"overlap": each.now.overlap, "in_view": each.now.in_view}
-            said = {
-                "meaning": zone_words(each.zone.on, **shares),
-                "counted": counts.get(each.zone.id, ""),
-                "sure": corner_words(worst_px),
-            }
-        rows.append(ZoneRow(name=each.zone.id, overlap=each.now.overlap, **said))
+            words["meaning"] = zone_words(each.zone.on, **shares)
+            words["counted"] = counts.get(each.zone.id, "")
+        rows.append(ZoneRow(name=each.zone.id, overlap=each.now.overlap, **words))
     return rows
+
+
+def _undetermined(view: ZonesView) -> str:
+    """What zones do not follow, in words; empty unless the camera moved since they were drawn."""
+    if view.record is None or not view.held.drifted or drawn_since_move(view.record, view.held):
+        return ""
+    return undetermined_words(view.held.identifiable)
 
 
 def _plan(record: PlanRecord | None) -> dict[str, Any] | None:

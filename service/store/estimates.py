@@ -136,13 +136,14 @@ def newest_of_earlier(session: Session, camera_id: str, reference_id: int) -> Es
     return session.scalars(query.where(EstimateRecord.reference_id < reference_id).limit(1)).first()
 
 
-def standing_at(
-    session: Session, camera_id: str, prior_pose_id: int, at_s: float
+def last_at(
+    session: Session, camera_id: str, prior_pose_id: int, at_s: float, *, drifting: bool
 ) -> EstimateRecord | None:
-    """The last estimate that knew of a time and by which a camera had not moved; or None."""
+    """The last estimate of people before a time, in state `drifting` or in another; or None."""
+    state = EstimateRecord.state
     query = newest_first(EstimateRecord, camera_id).where(
         EstimateRecord.prior_pose_id == prior_pose_id,
-        EstimateRecord.state != PoseState.DRIFTING,
+        state == PoseState.DRIFTING if drifting else state != PoseState.DRIFTING,
         EstimateRecord.from_s <= at_s,
     )
     return session.scalars(query.limit(1)).first()

@@ -1,11 +1,12 @@
 """Zones in words: how much of one still lies where it was drawn, how much the picture shows."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from models.quantiles import Z90
 from service.enums import ZoneOn
 from service.wording.language import N_, _, _n
+from service.wording.moves import NAMES
 
 _APPLIED = {
     "frigate": N_(
@@ -82,7 +83,24 @@ def apply_words(form: str | None) -> str:
 
 
 def corner_words(worst_px: float | None) -> str:
-    """How sure mended corners are, by the major semi-axis of the least sure one; maybe nothing."""
+    """The 90 % error of a zone's corners, by the major semi-axis of the worst one; maybe empty."""
     if worst_px is None:
         return ""
-    return _("mended corners are sure to ±{px:.0f} px", px=max(Z90 * worst_px, 1.0))
+    return _("corners within ±{px:.0f} px (90 %)", px=max(Z90 * worst_px, 1.0))
+
+
+def undetermined_words(identifiable: Collection[str]) -> str:
+    """What the zones of a camera that moved do not follow, in a sentence; empty if they do all."""
+    open_ = [_(name) for parameter, name in NAMES.items() if parameter not in identifiable]
+    if not open_:
+        return ""
+    if len(open_) == len(NAMES):
+        return _(
+            "The camera has moved, and the tracks do not determine its new pose: the zones are "
+            "shown as drawn, and may be off by the ± of each."
+        )
+    return _(
+        "The tracks do not determine {names}: if that changed too, the zones do not follow it and "
+        "are off by up to the ± of each.",
+        names=_(" and ").join(open_),
+    )

@@ -127,6 +127,7 @@ def draw_case(
     fault: Fault | None = None,
     heading_rad: float | None = None,
     still_share: float = 0.0,
+    offset: PoseOffset | None = None,
 ) -> ProtocolCase:
     """Part a scene's people in two and offset the camera before the second.
 
@@ -142,16 +143,18 @@ def draw_case(
         heading_rad: the offset of the heading; else it is drawn, too.
         still_share: the share of those who come after the reference whom the still camera sees;
             who is in the picture while it moves is left out.
+        offset: of the pose, in place of one that is drawn.
     """
     rng = np.random.default_rng(seed)
     parts = part_people(scene, parting, rng)
     tilt, roll = rng.uniform(-1, 1, 2) * (offset_range.tilt_rad, offset_range.roll_rad)
-    offset = PoseOffset(
+    drawn = PoseOffset(
         tilt_rad=tilt,
         roll_rad=roll,
         log_height=rng.uniform(-1, 1) * offset_range.log_height,
         heading_rad=rng.uniform(-1, 1) * offset_range.heading_rad,
     )
+    offset = offset or drawn
     if heading_rad is not None:
         offset = replace(offset, heading_rad=heading_rad)
     still, moved = scene.true_pose, offset.apply(scene.true_pose)

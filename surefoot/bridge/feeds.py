@@ -8,6 +8,7 @@ from functools import cached_property
 from paho.mqtt.client import topic_matches_sub
 
 from surefoot.bridge import axis, deepstream, frames, frigate, onvif
+from surefoot.bridge.camera_names import camera_id_of
 from surefoot.bridge.values import Found, MessageError, check_size
 
 _CAMERA = re.compile(r"[a-z0-9][a-z0-9-]{0,62}")
@@ -95,8 +96,8 @@ class Topics:
         return self._known[topic]
 
     def camera_of(self, name: str) -> str:
-        """What a source's camera is called here: the same, as ids are spelled, or as it is told."""
-        return _checked(self.cameras.get(name, name.lower().replace("_", "-")))
+        """The camera id for a source's name of a camera."""
+        return _checked(camera_id_of(name, self.cameras))
 
 
 def read_feeds(setting: str) -> tuple[Feed, ...]:

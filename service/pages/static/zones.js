@@ -28,6 +28,16 @@ const button = () => box.querySelector('[data-act="draw-zones"]');
 const least = (zone) => (zone.line ? 2 : 3);
 const index = (element) => Number(element.dataset.corner ?? -1);
 
+/** A collection in pixels of this image, if it came in shares or in pixels of another stream. */
+function inPixels({ size, normalised, ...collection }) {
+  const [w, h] = normalised ? [1, 1] : (size ?? [width, height]);
+  const from = normalised ? 0 : 0.5; // shares count from the edge, pixels from their centre
+  const scaled = (at) => (Array.isArray(at[0]) ? at.map(scaled) : [((at[0] + from) * width) / w - 0.5, ((at[1] + from) * height) / h - 0.5]);
+  if (normalised || size)
+    for (const { geometry } of collection.features) geometry.coordinates = scaled(geometry.coordinates);
+  return collection;
+}
+
 function zoneOf(feature) {
   const { type, coordinates } = feature.geometry;
   const { id, name: called } = feature.properties ?? {};
@@ -170,7 +180,7 @@ function remove() {
 async function enter({ dataset }) {
   const answer = await fetch(url, { headers: { Accept: "application/geo+json" } });
   if (!answer.ok) throw new Refused(await answer.json());
-  const collection = await answer.json();
+  const collection = inPixels(await answer.json());
   drawing = { collection, etag: answer.headers.get("ETag"), zones: collection.features.map(zoneOf) };
   const lost = Number(dataset.zones) - drawing.zones.length;
   says.textContent = lost > 0 ? _("{n} of the zones cannot be drawn where they are now, and would be gone once you save.", { n: lost }) : "";

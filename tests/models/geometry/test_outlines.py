@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from models.geometry.drawn_outlines import clipped, inside
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
-from models.geometry.outlines import (
-    Outline,
-    View,
-    clipped,
-    inside,
-    moved_outline,
-    within_picture,
-)
+from models.geometry.outlines import Outline, View, moved_outlines, within_picture
 from models.geometry.pose import CameraPose
 
 GATE = np.array([[400.0, 350.0], [800.0, 360.0], [900.0, 600.0], [350.0, 580.0]])
@@ -38,7 +32,7 @@ def outline(lens, pose, corners=GATE, *, on_ground=True):
 
 
 def after(of, pose, covariance=None):
-    return moved_outline(of, View(intrinsics=of.drawn.intrinsics, pose=pose), covariance)
+    return moved_outlines([of], View(intrinsics=of.drawn.intrinsics, pose=pose), covariance)[0]
 
 
 @pytest.mark.parametrize("distortion", [(0.0,) * 5, (-0.25, 0.08, 0.001, -0.001, 0.0)])
@@ -117,11 +111,11 @@ def test_shares_are_those_of_areas(lens):
     of = outline(lens, down, square)
     aside_m = 50 / 1100 * 10
     now = View(intrinsics=lens, pose=replace(down, x_m=aside_m))
-    found = moved_outline(of, now, None)
+    (found,) = moved_outlines([of], now, None)
     assert found.overlap == pytest.approx(0.75, abs=0.02)
     assert found.in_view == 1.0
     far = View(intrinsics=lens, pose=replace(down, x_m=640 / 1100 * 10))
-    found = moved_outline(of, far, None)
+    (found,) = moved_outlines([of], far, None)
     assert found.in_view == pytest.approx(0.5, abs=0.02)
     assert found.overlap == 0.0
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from models.geometry.ground import ground_from_pixel, ground_of_rays, pixel_from_ground
 from models.geometry.pose import CameraPose, array_of
-from models.geometry.propagation import error_ellipses, restricted
+from models.geometry.propagation import error_ellipses
 from models.geometry.rotation import rotation_from_angles
 
 # Tilt and height of an estimate by walking speeds lean on each other.
@@ -71,12 +71,6 @@ def test_a_camera_that_turns_moves_what_is_far_sideways():
     away_m = 5.0 / math.tan(math.radians(20))
     assert_allclose(major, away_m * math.radians(1.0), rtol=1e-6)
     assert_allclose([minor, angle], 0.0, atol=1e-6)  # along +X, right of where it looks
-
-
-def test_what_is_not_named_is_certain():
-    only = restricted(COVARIANCE, ("height",))
-    assert only[2, 2] == COVARIANCE[2, 2]
-    assert only.sum() == only[2, 2]
 
 
 def test_pixels_of_places_are_as_unsure_as_their_places(lens, pose):

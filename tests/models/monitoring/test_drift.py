@@ -14,6 +14,7 @@ from models.monitoring.drift import (
     MoveProbabilities,
     drift_between,
     pose_after,
+    served_error,
 )
 from models.reasons import TracksCode
 
@@ -235,3 +236,30 @@ def test_no_drift_is_told_of_what_may_not_be_told(drifted, moved, statistic, cre
     told = judge(now, LIMITS, drifted, chart, creep).drifting
     assert may_be_alerted(moved, LIMITS, creep, alerted=bool(drifted)) or not told
     assert may_be_alerted(0.5, LIMITS, None, alerted=False) is False
+
+
+COVARIANCE = np.diag(np.radians([0.3, 0.4, 1.0, 6.0]) ** 2)
+
+
+def test_served_error_of_a_moved_camera_includes_what_is_not_determined():
+    found = drift(tilt_deg=3, roll_deg=-2, heading_deg=1, able=THREE)
+    served = pose_after(found, PRIOR)
+    error = served_error(found, PRIOR, COVARIANCE, served, moved=True)
+    expected = COVARIANCE.copy()
+    expected[3, 3] += math.radians(1) ** 2  # the posterior's mean, which is not served
+    np.testing.assert_allclose(error, expected, atol=1e-15)
+
+
+def test_served_error_without_a_move_counts_open_parameters_by_their_probability():
+    move = likely(0.02, heading=0.01, tilt=0.02)
+    found = drift(tilt_deg=0.5, able=THREE, move=move)
+    error = served_error(found, PRIOR, COVARIANCE, PRIOR, moved=False)
+    assert error[3, 3] == pytest.approx(0.01 * COVARIANCE[3, 3])
+    assert error[0, 0] == pytest.approx(COVARIANCE[0, 0] + math.radians(0.5) ** 2)
+    assert error[1, 1] == pytest.approx(COVARIANCE[1, 1])
+
+
+def test_served_error_in_height_is_of_its_logarithm():
+    found = drift(height_m=6.6, able=("tilt", "roll"))
+    error = served_error(found, PRIOR, COVARIANCE, PRIOR, moved=True)
+    assert error[2, 2] == pytest.approx(COVARIANCE[2, 2] + math.log(1.1) ** 2)

@@ -117,13 +117,12 @@ def test_a_wrong_clock_moves_no_camera(bench):
 
 def test_ellipses_are_of_the_posterior_with_its_correlations(bench):
     """Against draws of the pose by what is stored, through OpenCV's geometry."""
-    bench.see(moved(tilt_deg=4, roll_deg=2), change=5)
+    bench.see(moved(tilt_deg=4, roll_deg=2), change=5, paths=True)
     answer = ask(bench.http, FEET)
     with Store(bench.settings).read() as session:
         held = held_pose(session, "corner")
-    assert set(held.identifiable) == {"tilt", "roll", "height"}
-    assert held.own[0, 0] > 0
-    assert not held.own[3].any()  # the heading is the prior pose's
+    assert set(held.identifiable) == {"tilt", "roll", "height", "heading"}
+    assert (np.diag(held.own) > 0).all()
     rng = np.random.default_rng(0)
     offsets = rng.multivariate_normal(np.zeros(4), held.own, 4000)
     pose = held.pose

@@ -2,15 +2,19 @@
 
 import copy
 import json
+import math
 from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 import yaml
+from fastapi.testclient import TestClient
 from numpy.testing import assert_allclose
 from sqlalchemy import delete
 
 from models.geometry.ground import ground_from_pixel, pixel_from_ground
+from service.app import create_app
+from service.cameras.held_poses import held_pose
 from service.store.cameras import forget_poses, prior_poses
 from service.store.estimates import EstimateRecord
 from service.store.references import SiteReferenceRecord
@@ -162,7 +166,7 @@ def test_pixels_are_shares_of_the_picture_from_its_edge(corner):
 
 def test_ground_goes_by_the_ground_and_the_scene_by_the_rotation(bench):
     draw(bench.http, GATE, WALL)
-    bench.see(moved(tilt_deg=4, roll_deg=-3), change=5)
+    bench.see(moved(tilt_deg=4, roll_deg=-3), change=5, paths=True)
     answer = bench.http.get(URL).json()
     assert answer["moved"] is True
     gate, wall = answer["zones"]
@@ -183,6 +187,36 @@ def test_ground_goes_by_the_ground_and_the_scene_by_the_rotation(bench):
         assert 0 <= angle < 180
     assert 0 < gate["overlap"] < 1
     assert gate["points"] == GATE["points"]
+
+
+def test_corners_of_a_moved_camera_include_a_heading_that_is_not_determined(bench):
+    """Its standard deviation, 6.3 deg by what is stored, is so many pixels across the image."""
+    draw(bench.http, GATE, WALL)
+    bench.see(moved(tilt_deg=4), change=5)
+    gate, wall = bench.http.get(URL).json()["zones"]
+    with bench.store.read() as session:
+        sd_rad = math.sqrt(held_pose(session, "corner").own[3, 3])
+    assert sd_rad > math.radians(3)
+    (u, v) = wall["points_now"][2]
+    ray = np.array([(u - 639.5) / 1100, (v - 359.5) / 1100, 1.0])
+    down = np.array([0, np.cos(math.radians(26)), np.sin(math.radians(26))])  # about: tilt 22 + 4
+    turned = np.cross(down, ray)
+    across_px = 1100 * sd_rad * np.hypot(*(turned[:2] - ray[:2] * turned[2]))
+    assert wall["sd_px"][2][0] == pytest.approx(across_px, rel=0.05)
+    assert min(major for major, _, _ in gate["sd_px"]) > 50
+
+
+def test_corners_have_an_error_if_the_tracks_determine_nothing(bench):
+    draw(bench.http, GATE)
+    bench.see(moved(tilt_deg=4), unidentifiable=("tilt", "roll", "height"))
+    answer = bench.http.get(URL).json()
+    assert (answer["by"]["drifted"], answer["by"]["estimated"]) == (False, [])
+    assert answer["zones"][0]["points_now"] == GATE["points"]
+    with bench.store.read() as session:
+        sd_rad = np.sqrt(np.diag(held_pose(session, "corner").own))
+    tilt_px = 1100 * sd_rad[0]  # of a corner near the middle, at least
+    assert tilt_px > 5
+    assert all(major > tilt_px for major, _, _ in answer["zones"][0]["sd_px"])
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
@@ -338,6 +372,49 @@ def test_other_types_and_too_much_are_refused(corner):
     problem(put(corner, ("application/yaml", "#" * 70_000)), 413, "too_large")
     problem(put(corner, ("application/json", "[" * 100_000)), 422, "malformed")
     problem(corner.get("/cameras/none/zones"), 404, "not_found")
+
+
+def test_put_zones_nested_too_deep_changes_nothing(corner):
+    put(corner, DOCUMENTS["geojson"], format="geojson").raise_for_status()
+    before = corner.get(URL, params={"format": "geojson"})
+    for levels in (33, 600, 900, 2_000, 100_000):
+        text = f'{DOCUMENTS["geojson"][1][:-1]}, "extra": {"[" * levels}{"]" * levels}}}'
+        problem(put(corner, ("application/geo+json", text)), 422, "malformed")
+    after = corner.get(URL, params={"format": "geojson"}).raise_for_status()
+    assert (after.text, after.headers["etag"]) == (before.text, before.headers["etag"])
+
+
+@pytest.mark.parametrize("scalar", ['!!int ""', '!!bool "x"', '!!float ""', "!!timestamp x", "007"])
+def test_put_frigate_yaml_never_converts_scalars(corner, scalar):
+    text = f"{FRIGATE}mqtt:\n    # broker\n    password: {scalar}\n"
+    put(corner, ("application/yaml", text)).raise_for_status()
+    assert corner.get(URL, params={"format": "frigate"}).text == text
+
+
+def test_put_frigate_configuration_finds_the_camera_by_the_setting(http, settings):
+    named = settings.model_copy(update={"mqtt_cameras": "Cam 7=corner"})
+    zone = "{zones: {a: {coordinates: '0.1,0.9,0.2,0.9,0.2,0.95'}}}"
+    text = f"cameras: {{other: {zone}, Cam 7: {zone.replace('a:', 'b:')}}}\n"
+    with TestClient(create_app(named)) as client:
+        client.post("/cameras", json=CAMERA).raise_for_status()
+        put(client, ("application/yaml", text)).raise_for_status()
+        assert [zone["id"] for zone in client.get(URL).json()["zones"]] == ["b"]
+        assert client.get(URL, params={"format": "frigate"}).text == text
+    http.post("/cameras", json={**CAMERA, "id": "c"})
+    body = put(http, ("application/yaml", text))
+    assert "MQTT_CAMERAS maps names" in problem(body, 422, "malformed")["detail"]
+
+
+def test_put_zones_in_shares_names_the_fix(corner):
+    shares = {"zones": [{"id": "a", "points": [[0.1, 0.9], [0.2, 0.9], [0.2, 0.95]]}]}
+    detail = problem(put(corner, shares), 422, "malformed")["detail"]
+    assert detail == (
+        "zones/0: a zone at least 1 px wide is needed, got 0.0479 px; "
+        'if these are shares of the 1280 x 720 px image, send "normalised": true'
+    )
+    (zone,) = put(corner, {**shares, "normalised": True}).raise_for_status().json()["zones"]
+    assert_allclose(zone["points"], [[127.5, 647.5], [255.5, 647.5], [255.5, 683.5]])
+    assert zone["in_view"] == 1.0
 
 
 def test_the_prior_pose_that_they_were_drawn_at_is_kept(bench):

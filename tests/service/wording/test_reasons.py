@@ -7,15 +7,14 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
+from models.assessment import Verdict, reason_of_drift
+from models.assessment.reasons import reason_of_chart
 from models.geometry.pose import PoseParameters
 from models.monitoring.chart import CLOCK, ChartResult
 from models.monitoring.drift import (
     Drift,
     DriftLimits,
-    Verdict,
     MoveProbabilities,
-    reason_of_chart,
-    reason_of_drift,
 )
 from models.reasons import Reason, TracksCode
 from service.reasons import (
