@@ -17,7 +17,6 @@ from sqlalchemy import (
     Index,
     LargeBinary,
     Result,
-    Select,
     SQLColumnExpression,
     String,
     UniqueConstraint,
@@ -182,21 +181,6 @@ def counting(camera_id: str | BindParameter[str]) -> list[ColumnElement[bool]]:
     return [TrackRecord.camera_id == camera_id, of_counting_source(camera_id)]
 
 
-def newest_source_of(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:
-    """The source that counts; where none does, that of the newest track."""
-    newest = (
-        select(TrackRecord.source)
-        .where(TrackRecord.camera_id == camera_id)
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(1)
-    )
-    if not isinstance(camera_id, str):
-        newest = newest.correlate(camera_id.class_)
-    return select(
-        func.coalesce(counting_source(camera_id).scalar_subquery(), newest.scalar_subquery())
-    )
-
-
 def started_from(camera_id: str, started_from_s: float | None) -> list[ColumnElement[bool]]:
     """The conditions that a track counts and started at or after a time."""
     conditions = counting(camera_id)
@@ -303,28 +287,6 @@ def count_since(session: Session, camera_id: str, ended_after_s: float | None) -
     """The number of tracks that ended after a time; all of them, if none is given."""
     after = [] if ended_after_s is None else [TrackRecord.ended_s > ended_after_s]
     return count_where(session, *counting(camera_id), *after)
-
-
-def newest_source(session: Session, camera_id: str) -> str | None:
-    """The source that counts; where none does yet, that of the newest track."""
-    return session.scalar(newest_source_of(camera_id))
-
-
-def cameras_fed_by(session: Session, source: str, received_after: datetime) -> set[str]:
-    """The cameras for which a source counts, of those that got a track after a time."""
-    received = (
-        select(func.max(TrackRecord.received_at))
-        .where(TrackRecord.camera_id == CameraRecord.id)
-        .scalar_subquery()
-    )
-    return set(
-        session.scalars(
-            select(CameraRecord.id).where(
-                newest_source_of(CameraRecord.id).scalar_subquery() == source,
-                received > received_after,
-            )
-        )
-    )
 
 
 def newest_pk(session: Session, camera_id: str) -> int | None:
