@@ -19,6 +19,7 @@ from models.durations import HOUR_S
 from service.alerts.arrival_models import compute_arrival_model, load_arrivals, save_arrival_model
 from service.alerts.staleness import StaleWatch
 from service.data_dir import ROUNDS
+from service.errors import ServiceError
 from service.notifications import deliveries
 from service.store import cameras
 from service.store.engines.store import Lock
@@ -61,6 +62,8 @@ class Periodic:
         try:
             with nullcontext() if self.steps else context.running.job(UPKEEP, self.name):
                 self.do()
+        except ServiceError as error:  # a full disk, for example
+            log.warning("round_failed", extra={"round": self.name, "why": error.detail})
         except Exception:
             log.exception("round_failed", extra={"round": self.name})
         self.due_s = time.monotonic() + self.every_s
