@@ -41,6 +41,7 @@ ENGINE_TABLES = (
     *(*_SERIALIZED, *_CONTENT),
     *("workflow_schedules", "queues", "application_versions"),
 )
+ENGINE_REVISION = "dbos_migrations"  # the engine makes its tables anew if this one is missing
 _ENGINE_CONNECTIONS = 5  # to a server, of each worker
 # The engine's priorities are whole numbers from 1 to 2**31 - 1, the smallest first: 68 years.
 _BEGINNING = datetime(2026, 1, 1, tzinfo=UTC)
