@@ -291,6 +291,7 @@ def unheeded(session: Session, since: datetime, now: datetime) -> Sequence[Alert
         ActivityRecord.subject_id == AlertRecord.id,
         ActivityRecord.what.in_(TOLD_ANEW),
         ActivityRecord.at > since,
+        ActivityRecord.at <= now,  # not of before the clock was set back
     )
     return session.scalars(
         _waiting(now).where(

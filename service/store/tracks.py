@@ -22,10 +22,12 @@ from sqlalchemy import (
     UniqueConstraint,
     bindparam,
     case,
+    exists,
     func,
     select,
+    update,
 )
-from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, aliased, mapped_column
 
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
@@ -385,3 +387,50 @@ def unseen_since(session: Session) -> dict[str, tuple[int, datetime]]:
         )
     )
     return {camera_id: (pk, received_at) for camera_id, pk, received_at in rows}
+
+
+_OTHER = aliased(TrackRecord)
+_MOVED = (
+    update(TrackRecord.__table__)  # type: ignore[arg-type]
+    .where(
+        TrackRecord.id == bindparam("pk"),
+        ~exists().where(
+            _OTHER.camera_id == TrackRecord.camera_id,
+            _OTHER.source == TrackRecord.source,
+            _OTHER.track_id == TrackRecord.track_id,
+            _OTHER.started_s == bindparam("new_started_s"),
+        ),
+    )
+    .values(
+        points=bindparam("new_points"),
+        started_s=bindparam("new_started_s"),
+        ended_s=bindparam("new_ended_s"),
+    )
+)
+_MOVED_AT_ONCE = 500
+
+
+def follow_clock(session: Session, back_s: int, limit_s: float) -> int:
+    """Move the times of tracks that end after `limit_s` back; return how many there were.
+
+    A track is deleted if another track of its name has its new start time already.
+    """
+    ahead = TrackRecord.camera_id.in_(select(CameraRecord.id)), TrackRecord.ended_s > limit_s
+    found = session.scalars(select(TrackRecord.id).where(*ahead)).all()
+    for at in range(0, len(found), _MOVED_AT_ONCE):
+        chosen = TrackRecord.id.in_(found[at : at + _MOVED_AT_ONCE])
+        rows = session.execute(select(TrackRecord.id, TrackRecord.points).where(chosen))
+        session.connection().execute(_MOVED, [_moved(pk, data, back_s) for pk, data in rows])
+    delete_some(session, TrackRecord.id, select(TrackRecord.id).where(*ahead))
+    return len(found)
+
+
+def _moved(track_pk: int, data: bytes, back_s: int) -> dict[str, Any]:
+    points = unpack(data, 3)
+    points[:, 0] -= back_s
+    return {
+        "pk": track_pk,
+        "new_points": pack(points),
+        "new_started_s": float(points[0, 0]),
+        "new_ended_s": float(points[-1, 0]),
+    }
