@@ -74,7 +74,7 @@ def _narrowed(table: Table, column: Column[Any], now: datetime) -> tuple[ColumnE
     """Conditions that spare a scan of large tables, and a window that was planned for later."""
     if str(column) == "maintenance_windows.from_at":
         return (column <= table.c.created_at,)  # it began when somebody asked for it
-    if table.name == "tracks":
+    if table is tracks.TrackRecord.__table__:
         return (table.c.camera_id.in_(select(Record.metadata.tables["cameras"].c.id)),)
     if table.name == "estimates":
         before = select(table.c.id).where(table.c.created_at <= now - _UNSURE)
