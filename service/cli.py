@@ -13,7 +13,7 @@ from rich.markup import escape
 from service.commands.asking import LOCAL_URL, Url
 from service.commands.data import DATA_COMMANDS, DataDir
 from service.commands.remote import REMOTE_COMMANDS
-from service.commands.settings_given import WrongSettingsError, begin
+from service.commands.settings_given import WrongSettingsError, begin, warn_of_variables
 from service.commands.tokens import app as token_app
 from service.data_dir import StartError
 from service.workers.processes.collector import importing
@@ -63,6 +63,7 @@ def serve(
 ) -> None:
     """Serve the API and run the local workers, until SIGTERM."""
     settings = begin(data_dir=data_dir, host=host, port=port, workers=workers, recipe=recipe)
+    warn_of_variables()
     with importing():
         from service.commands.serve import run_service
 
@@ -87,7 +88,8 @@ def worker(
         from service.commands.worker import WorkerRunningError, run_worker
         from service.workers.processes import exits
 
-    if not follow_stdin:  # `serve` has migrated already
+    if not follow_stdin:  # `serve` has warned and migrated already
+        warn_of_variables()
         run_migrations(settings)
     try:
         run_worker(settings, name, follow_stdin, only)

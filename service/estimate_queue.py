@@ -146,7 +146,8 @@ def end_look(
     """
     camera = session.get(CameraRecord, camera_id)
     if camera is not None:
-        camera.looked_at_pk, camera.checked_at = newest_pk, _now()
+        if camera.looked_at_pk != newest_pk:
+            camera.looked_at_pk, camera.checked_at = newest_pk, _now()
         camera.estimate_tries = 0
         camera.estimate_error = camera.estimate_failing_since = None
         camera.estimate_after = _now() + timedelta(seconds=min(rest_s, LONGEST_COOLDOWN_S))

@@ -41,6 +41,7 @@ ENGINE_TABLES = (
     *(*_SERIALIZED, *_CONTENT),
     *("workflow_schedules", "queues", "application_versions"),
 )
+ENGINE_REVISION = "dbos_migrations"  # the engine makes its tables anew if this one is missing
 _ENGINE_CONNECTIONS = 5  # to a server, of each worker
 # The engine's priorities are whole numbers from 1 to 2**31 - 1, the smallest first: 68 years.
 _BEGINNING = datetime(2026, 1, 1, tzinfo=UTC)
@@ -78,6 +79,12 @@ _REQUEUE = text(
 ).bindparams(bindparam("workers", expanding=True))
 
 
+_BRING_FORWARD = text(
+    "UPDATE workflow_status SET priority = priority - :back WHERE queue_name = :queue "
+    "AND status = 'ENQUEUED' AND priority > :now AND priority > :back"
+)
+
+
 class JobQueue:
     """Enqueues and cancels jobs inside the caller's transaction; runs none."""
 
@@ -113,7 +120,7 @@ class JobQueue:
         camera's mark "due" stays: the next sweep sees it.
         """
         due_at = due_at - _HEAD_START if urgent else due_at
-        priority = max(round((due_at - _BEGINNING).total_seconds()), 1)
+        priority = _priority_of(due_at)
         # Outside the savepoint: one that is refused takes nothing of the caller's with it.
         with contextlib.suppress(error.DBOSQueueDeduplicatedError), savepoint(session):
             self._enqueue(
@@ -142,6 +149,18 @@ class JobQueue:
         """Give the unfinished jobs of lost workers back to the queue."""
         session.execute(_REQUEUE, {"workers": list(workers)})
 
+    def follow_clock(self, session: Session, set_back_by: timedelta, now: datetime) -> None:
+        """Give estimate jobs that wait the priority of the time at which their camera was due.
+
+        They would wait behind all later ones for as long as the clock jumped back.
+        """
+        values = {
+            "queue": ESTIMATE_JOB,
+            "back": round(set_back_by.total_seconds()),
+            "now": _priority_of(now),
+        }
+        session.execute(_BRING_FORWARD, values)
+
     def close(self) -> None:
         """Let go of the engine's connections."""
         self._client.destroy()
@@ -156,6 +175,10 @@ class JobQueue:
     def _enqueue(self, session: Session, job: str, about: str, **more: Any) -> None:
         options: Any = {"workflow_name": job, "queue_name": job, "app_version": JOBS_VERSION}
         self._client.enqueue_in_transaction(session, options | more, about)
+
+
+def _priority_of(due_at: datetime) -> int:
+    return max(round((due_at - _BEGINNING).total_seconds()), 1)
 
 
 def queue_of(session: Session) -> JobQueue:

@@ -1,6 +1,8 @@
 """Settings from `SUREFOOT_...` variables and flags: the only reader of the environment."""
 
+import difflib
 import os
+from collections.abc import Mapping
 from datetime import UTC, tzinfo
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
@@ -13,6 +15,9 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from service import setting_values as values
 from service.data_dir import DATABASE, WEIGHTS
 
+_PREFIX = "SUREFOOT_"
+_OTHERS = ("SUREFOOT_TOKEN", "SUREFOOT_TOKEN_FILE", "SUREFOOT_URL")  # of commands, no settings
+_ALIKE = 0.85  # of a misspelled name, by `difflib`
 _TOPIC = r"^[^+#\x00]+$"
 Networks = Annotated[str, values.readable(values.read_networks)]
 
@@ -20,7 +25,7 @@ Networks = Annotated[str, values.readable(values.read_networks)]
 class Settings(BaseSettings):
     """Everything that an operator can set; each field is also `SUREFOOT_<FIELD>`."""
 
-    model_config = SettingsConfigDict(env_prefix="SUREFOOT_", frozen=True)
+    model_config = SettingsConfigDict(env_prefix=_PREFIX, frozen=True)
 
     data_dir: Path = Field(Path("surefoot-data"), description="database and weights live here")
     database_url: Annotated[str, AfterValidator(values.read_database_url)] | None = Field(
@@ -386,5 +391,24 @@ class Settings(BaseSettings):
     def as_environment(self) -> dict[str, str]:
         """This process's environment with these settings in it, for a child process."""
         values = self.model_dump(mode="json", exclude_none=True)
-        ours = {f"SUREFOOT_{name.upper()}": str(value) for name, value in values.items()}
+        ours = {f"{_PREFIX}{name.upper()}": str(value) for name, value in values.items()}
         return {**os.environ, **ours}
+
+
+def variables_without_effect(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return variables that look like settings and are none, with the ones to use instead.
+
+    Two kinds: a setting's name without its prefix, and a misspelled name with the prefix. A
+    variable is left out if the right one is set, too.
+    """
+    given = {name.upper() for name in environment}
+    known = {f"{_PREFIX}{name.upper()}" for name in Settings.model_fields}
+    found = {}
+    for name in sorted(given - known - set(_OTHERS)):
+        if name.startswith(_PREFIX):
+            meant = difflib.get_close_matches(name, known, 1, _ALIKE)
+        else:
+            meant = [_PREFIX + name] if _PREFIX + name in known else []
+        if meant and meant[0] not in given:
+            found[name] = meant[0]
+    return found

@@ -25,7 +25,7 @@ from service.errors import ConflictError, NotFoundError
 from service.notifications.outbox import alert_body, queue_alert
 from service.reasons import Reasons
 from service.settings import Settings
-from service.store import alerts, journal, references, tracks
+from service.store import alerts, journal, references, sources
 from service.store.alerts import AlertFilter, AlertRecord
 from service.store.journal import ActivityRecord
 from service.wording.reasons import in_words
@@ -83,10 +83,12 @@ def open_alert(
         record.changed_at = changed_at or record.changed_at
         record.changed_after = changed_after or record.changed_after
     else:
+        poster = sources.poster_of(session, camera_id)
         record = AlertRecord(
             id=secrets.token_hex(16),
             camera_id=camera_id,
-            track_source=tracks.newest_source(session, camera_id),
+            track_source=None if poster is None else poster.source,
+            poster_id="" if poster is None else poster.token_id,
             kind=kind,
             state=AlertState.FIRING,
             notified=False,
@@ -188,6 +190,14 @@ def close_alert(
         # That of most members; of as many, the last one's.
         of_most = max(came, key=lambda each: (came[each], each == outcome))
         close_alert(session, group, of_most, note, by)
+
+
+def leave_group(session: Session, record: AlertRecord) -> None:
+    """Take a firing alert out of its group, and notify of it if nothing has yet."""
+    record.group_id = None
+    session.flush()
+    if not record.notified:
+        _tell(session, record, MessageType.ALERT_OPENED)
 
 
 def reopen_alert(session: Session, record: AlertRecord, by: str | None) -> None:

@@ -14,6 +14,7 @@ from service.settings import Settings
 from service.store import alerts, bridges, cameras
 from service.store.bridges import BridgeRecord
 from service.store.engines.dialects import now_in
+from service.store.sources import Poster
 from service.wording.alerts import BRIDGE_WORKS
 
 log = logging.getLogger("surefoot.jobs")
@@ -74,7 +75,7 @@ class BridgeWatch:
 
 def _follow(session: Session, record: BridgeRecord, problem: Reason | None) -> None:
     name = record.name
-    firing = alerts.firing_group(session, name, AlertKind.STALE)
+    firing = alerts.firing_group(session, _poster(name), AlertKind.STALE)
     if problem is None:
         if firing is not None:
             close_alert(session, firing, Outcome.CLEARED, BRIDGE_WORKS)
@@ -97,8 +98,12 @@ def _follow(session: Session, record: BridgeRecord, problem: Reason | None) -> N
     log.warning("bridge_fails", extra={"bridge": name, "reason_code": problem.code})
 
 
+def _poster(bridge: str) -> Poster:
+    return Poster(source=bridge, token_id="")  # its alert is about the bridge, not a token
+
+
 def _answered(session: Session, name: str) -> bool:
-    last = alerts.newest_group(session, name, AlertKind.STALE)
+    last = alerts.newest_group(session, _poster(name), AlertKind.STALE)
     if last is None or last.resolved_at is None or last.outcome == Outcome.CLEARED:
         return False
     return abs(datetime.now(UTC) - last.resolved_at) < _ANSWERED

@@ -1,4 +1,4 @@
-"""Many cameras of one tracker that move together: one alert that blames the tracker."""
+"""Cameras of one poster that move together: one alert that names the tracker as the cause."""
 
 import math
 import secrets
@@ -11,36 +11,39 @@ from models.reasons import Reason
 from service.enums import AlertKind, AlertSource, AlertState, Severity
 from service.reasons import ServiceCode
 from service.settings import Settings
-from service.store import alerts, tracks
+from service.store import alerts, sources
 from service.store.alerts import AlertRecord
 from service.store.engines.store import also_about
+from service.store.sources import Poster
 
 _FED_WITHIN = timedelta(days=1)  # a camera without tracks for longer is no longer fed by its source
 
 
 def group_with(session: Session, settings: Settings, record: AlertRecord) -> AlertRecord | None:
-    """Put a camera's open alert into the group that it belongs to; returns one that has to be told.
+    """Put a camera's open alert into its group; return the group if it is new.
 
-    Cameras of one source whose alerts begin within `group_within_s` of each other are taken
-    together once they are `group_cameras` or more, and at least `group_share` of all that get
-    tracks of that source. Whoever comes later joins without a word.
+    A group has cameras of one poster: of one source name, posted by one token. Their alerts begin
+    within `group_within_s` of each other, they are `group_cameras` or more, and at least
+    `group_share` of the cameras that the poster feeds. Later alerts join without a notification.
+    Alerts that an earlier group left open stay by themselves.
     """
     kind = next((kind for kind, kinds in alerts.MEMBER_KINDS.items() if record.kind in kinds), None)
     if kind is None or record.track_source is None or record.group_id is not None:
         return None
-    source = record.track_source
-    also_about(session, f"source/{source}")  # cameras that move at the same moment see each other
-    together = _together(
-        alerts.firing_of_source(session, source, alerts.MEMBER_KINDS[kind]),
-        record,
-        settings.group_within_s,
-    )
-    group = alerts.firing_group(session, source, kind)
+    poster = Poster(source=record.track_source, token_id=record.poster_id)
+    # Cameras that move at the same moment see each other.
+    also_about(session, f"source/{poster.source}")
+    found = alerts.firing_of_poster(session, poster, alerts.MEMBER_KINDS[kind])
+    ended_at = alerts.group_ended_at(session, poster, kind)
+    if ended_at is not None:
+        found = [each for each in found if each.group_id or each.opened_at > ended_at]
+    together = _together(found, record, settings.group_within_s)
+    group = alerts.firing_group(session, poster, kind)
     known = group is not None and any(member.group_id == group.id for member in together)
-    if not known and not _enough(session, settings, source, together):
+    if not known and not _enough(session, settings, poster, together):
         return None
     opened = group is None
-    group = group or _new_group(session, source, kind)
+    group = group or _new_group(session, poster, kind)
     for member in together:
         member.group_id = group.id
     members = {str(member.camera_id) for member in together}
@@ -53,12 +56,13 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     return group if opened else None
 
 
-def _new_group(session: Session, source: str, kind: AlertKind) -> AlertRecord:
+def _new_group(session: Session, poster: Poster, kind: AlertKind) -> AlertRecord:
     now = datetime.now(UTC)
     group = AlertRecord(
         id=secrets.token_hex(16),
         camera_ids=[],
-        track_source=source,
+        track_source=poster.source,
+        poster_id=poster.token_id,
         kind=kind,
         state=AlertState.FIRING,
         source=AlertSource.GROUP,
@@ -77,7 +81,7 @@ def _new_group(session: Session, source: str, kind: AlertKind) -> AlertRecord:
 def _together(
     found: Sequence[AlertRecord], record: AlertRecord, within_s: float
 ) -> list[AlertRecord]:
-    """The most alerts, this one among them, that begin within so long of each other."""
+    """Return the largest set of alerts, with this one, that begin within `within_s`."""
     at = _began_at(record)
     span = timedelta(seconds=within_s)
     best: list[AlertRecord] = []
@@ -90,12 +94,12 @@ def _together(
 
 
 def _enough(
-    session: Session, settings: Settings, source: str, together: Sequence[AlertRecord]
+    session: Session, settings: Settings, poster: Poster, together: Sequence[AlertRecord]
 ) -> bool:
     cameras = {alert.camera_id for alert in together}
     if len(cameras) < settings.group_cameras:
         return False
-    fed = tracks.cameras_fed_by(session, source, datetime.now(UTC) - _FED_WITHIN)
+    fed = sources.cameras_fed_by(session, poster, datetime.now(UTC) - _FED_WITHIN)
     return len(cameras) >= math.ceil(settings.group_share * len(fed | cameras))
 
 

@@ -98,6 +98,9 @@ class AlertOut(BaseModel):
     outcome: Outcome | None
     note: str | None
     track_source: str | None
+    poster_id: str = Field(
+        description="token that posts under `track_source`; empty if access control is off"
+    )
     camera_ids: list[str] | None
     group_id: str | None
 

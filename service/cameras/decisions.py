@@ -5,8 +5,9 @@ Each closes the alerts about the pose, keeps who said it, and ends what was esti
 
 from sqlalchemy.orm import Session
 
+from models.geometry.pose import ANGLES
 from service.access.activity import note as note_activity
-from service.alerts.alerts import close_alert, close_pose_alerts, require_firing
+from service.alerts.alerts import close_alert, close_pose_alerts, leave_group, require_firing
 from service.cameras.answers import Decision, state_before
 from service.cameras.cameras import renew_prior_pose, require_camera
 from service.cameras.held_poses import held_pose, keep_drawn
@@ -15,9 +16,9 @@ from service.enums import Activity, AlertKind, AlertState, Answer, Origin, Outco
 from service.errors import ConflictError, MalformedError
 from service.estimate_queue import request_estimate
 from service.job_queue import JobQueue
-from service.references import begin_reference, keep_answer
+from service.references import begin_reference, keep_answer, made_against
 from service.settings import Settings
-from service.store import alerts, pictures, tracks
+from service.store import alerts, estimates, pictures, references, tracks
 from service.store.alerts import AlertRecord
 
 
@@ -131,15 +132,16 @@ def resolve_alert(
     note: str | None,
     by: str | None,
 ) -> AlertRecord:
-    """End an alert with what came of it; an alert of the same kind may open anew later.
+    """End an alert with an outcome; an alert of the same kind may open again later.
 
-    What is said of a camera's pose is said of all its alerts about the pose. A group's members end
-    with it, and the same way.
+    An answer about a camera's pose ends all its alerts about the pose. The members of a group end
+    with it, except for cameras whose own estimate indicates a turn: an answer about the tracker is
+    no answer about these, and their alerts fire on by themselves.
 
     Raises:
-        NotFoundError: there is none of that id.
+        NotFoundError: no alert has that id.
         ConflictError: it is resolved, or there is no pose to accept.
-        MalformedError: nothing of its kind can come to that.
+        MalformedError: its kind has no such outcome.
     """
     record = require_firing(session, alert_id)
     known = alerts.answers_of(record.kind)
@@ -149,8 +151,12 @@ def resolve_alert(
             f"{' or '.join(known)} is what an alert of kind {record.kind} can come to, "
             f"got {answer}",
         )
-    for each in (*alerts.firing_members(session, record.id), record):
-        if each.state != AlertState.FIRING:
+    members = alerts.firing_members(session, record.id)
+    turned = [each for each in members if _has_turned(session, each)]
+    for each in turned:
+        leave_group(session, each)
+    for each in (*members, record):
+        if each in turned or each.state != AlertState.FIRING:
             continue
         if each.camera_id is None or each.kind not in alerts.POSE_KINDS:
             close_alert(session, each, Outcome(answer), note, by)
@@ -163,6 +169,16 @@ def resolve_alert(
         else:
             _answer(session, queue, decision, answer)
     return record
+
+
+def _has_turned(session: Session, member: AlertRecord) -> bool:
+    """True if the camera's newest estimate indicates a turn, which no clock can cause."""
+    assert member.camera_id is not None
+    last = estimates.newest(session, member.camera_id)
+    if last is None or member.kind != AlertKind.DRIFT:
+        return False
+    reference = references.newest(session, member.camera_id)
+    return made_against(reference, last) and not set(ANGLES).isdisjoint(last.drifted)
 
 
 def _answer(session: Session, queue: JobQueue, decision: Decision, answer: Answer) -> None:

@@ -45,7 +45,8 @@ _TIMES = ("answered_at", "drift_after", "drift_since")
 def last_answer(session: Session, camera_id: str, now: datetime) -> ActivityRecord | None:
     """The answer that can be taken back; None where there is none, or something hangs on it."""
     entry = journal.newest_of(session, camera_id, (*ANSWERS, *_BARRIERS))
-    if entry is None or entry.what not in ANSWERS or now - entry.at > UNDO_WITHIN:
+    # Either way: the log keeps times of before the clock was set back.
+    if entry is None or entry.what not in ANSWERS or abs(now - entry.at) > UNDO_WITHIN:
         return None
     before = entry.details.get("before")
     if before is None or alerts.pose_doubted(session, camera_id):

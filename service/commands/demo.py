@@ -48,11 +48,17 @@ _PREFIX, _LOCK = "surefoot-demo-", "demo.lock"
 _HOST = "127.0.0.1"
 _BATCH = 10
 _PAUSE_S = 0.4  # for the eye
-_LONGEST_S = 150.0
+_PATIENCE_S = 150.0  # for one step, on a machine that is busy with other things
+_STOP_S = 20.0
+_BUSY = (429, 503)
 
 
 def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
-    """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior."""
+    """Run the demo; 0 if the alert came and the pose is nearer to the knocked than to the prior.
+
+    Raises:
+        StartError: the port is taken, the service ended, or it did not answer in time.
+    """
     # It plays by itself: a site's settings, its database or its broker, are nothing of its.
     for name in [name for name in os.environ if name.startswith("SUREFOOT_")]:
         del os.environ[name]
@@ -74,8 +80,11 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
         url = f"http://{settings.host}:{settings.port}"
         console.print(f"Watch it in a browser: {url}/ui/cameras/{CAMERA_ID}\n")
         with _service(settings) as service, httpx.Client(base_url=url, timeout=30) as http:
-            _wait_ready(http, service, started)
-            screen, progress = _play(http, console, seed, started)
+            try:
+                _wait(lambda: http.get("/readyz").is_success, service, "started")
+                screen, progress = _play(http, console, seed, service)
+            except httpx.HTTPError as error:
+                raise StartError(f"demo: its service failed: {error}".splitlines()[0]) from error
             won = _close(console, screen, url, time.monotonic() - started)
             if picture is not None:
                 save_picture(screen.table(progress), picture)
@@ -87,7 +96,7 @@ def run_demo(*, port: int, seed: int, stay: bool, picture: Path | None) -> int:
 
 
 def _play(
-    http: httpx.Client, console: Console, seed: int, started: float
+    http: httpx.Client, console: Console, seed: int, service: subprocess.Popen[bytes]
 ) -> tuple[Screen, Progress]:
     screen = Screen()
     progress = Progress(
@@ -102,14 +111,14 @@ def _play(
     clock_s = time.time() - BETWEEN_S * sum(count for _, _, count in parts)
     with Live(get_renderable=lambda: screen.table(progress), console=console) as live:
         training = progress.add_task("beside it, a regressor is trained", total=None)
-        http.post("/cameras", json=street_body()).raise_for_status()
+        _wait(lambda: _registered(http), service, "registered the camera")
         for number, (words, pose, count) in enumerate(parts):
             if pose != PRIOR:
                 screen.knocked_at = datetime.fromtimestamp(clock_s, UTC)
             task = progress.add_task(words, total=count)
             people = street_people(pose, count, seed + number)
             for at in range(0, count, _BATCH):
-                _show(http, screen, people[at : at + _BATCH], clock_s, started)
+                _show(http, screen, people[at : at + _BATCH], clock_s, service)
                 progress.update(task, advance=_BATCH)
                 _look_at_training(http, progress, training)
                 time.sleep(_PAUSE_S)
@@ -123,22 +132,33 @@ def _show(
     screen: Screen,
     people: Sequence[SceneTrack],
     clock_s: float,
-    started: float,
+    service: subprocess.Popen[bytes],
 ) -> None:
-    """Post people as a tracker would, when their walks have ended, and wait for the answer."""
-    receipt = post_tracks(http, CAMERA_ID, people, clock_s)
-    assert not receipt["rejected"], receipt
+    """Post people as a tracker would, when their walks have ended, and wait for the estimate."""
+    _wait(lambda: _posted(http, people, clock_s), service, "stored the tracks")
     screen.tracks += len(people)
     newest_s = clock_s + float(people[-1].trajectory.time_s[-1])
-    _wait(lambda: _looked_at(http, screen, newest_s), started)
+    _wait(lambda: _looked_at(http, screen, newest_s), service, "estimated from the newest tracks")
+
+
+def _registered(http: httpx.Client) -> bool:
+    answer = http.post("/cameras", json=street_body())
+    if answer.status_code != 409:  # a request that timed out may have registered it
+        answer.raise_for_status()
+    return True
+
+
+def _posted(http: httpx.Client, people: Sequence[SceneTrack], clock_s: float) -> bool:
+    receipt = post_tracks(http, CAMERA_ID, people, clock_s)
+    assert not receipt["rejected"], receipt
+    return True
 
 
 def _looked_at(http: httpx.Client, screen: Screen, newest_s: float) -> bool:
     """True if the newest track is in the reference or the estimate that is shown."""
     pose = http.get(f"/cameras/{CAMERA_ID}/pose").raise_for_status().json()
-    alerts = http.get(
-        "/alerts", params={"camera_id": CAMERA_ID, "state": AlertState.FIRING}
-    ).json()["items"]
+    wanted = {"camera_id": CAMERA_ID, "state": AlertState.FIRING}
+    alerts = http.get("/alerts", params=wanted).raise_for_status().json()["items"]
     screen.pose, screen.alert = pose, alerts[0] if alerts else None
     if pose["reference"]["state"] == ReferenceState.LEARNING:
         return bool(pose["reference"]["tracks"] < REFERENCE_TRACKS)
@@ -147,7 +167,10 @@ def _looked_at(http: httpx.Client, screen: Screen, newest_s: float) -> bool:
 
 
 def _look_at_training(http: httpx.Client, progress: Progress, task: Any) -> None:
-    training = http.get(f"/cameras/{CAMERA_ID}/trainings").json()["items"][-1]
+    answer = http.get(f"/cameras/{CAMERA_ID}/trainings")
+    if answer.status_code in _BUSY:
+        return
+    training = answer.raise_for_status().json()["items"][-1]
     step, steps = training["progress"]["step"], training["progress"]["steps"]
     progress.update(task, completed=step, total=steps or None)
 
@@ -172,17 +195,6 @@ def _close(console: Console, screen: Screen, url: str, took_s: float) -> bool:
     return to_knocked < to_prior
 
 
-def _wait_ready(http: httpx.Client, service: subprocess.Popen[bytes], started: float) -> None:
-    def is_ready() -> bool:
-        if service.poll() is not None:
-            raise StartError(f"demo: its service ended with {service.returncode}, see above")
-        with contextlib.suppress(httpx.TransportError):  # not listening yet
-            return http.get("/readyz").status_code == 200
-        return False
-
-    _wait(is_ready, started)
-
-
 @contextlib.contextmanager
 def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
     log_path = settings.data_dir / "serve.log"
@@ -197,19 +209,45 @@ def _service(settings: Settings) -> Iterator[subprocess.Popen[bytes]]:
         )
         try:
             yield process
-        except Exception:
-            Console(stderr=True).print(log_path.read_text()[-4000:], markup=False)
-            raise
         finally:
+            if process.poll() is not None:  # it ended by itself: its log has the reason
+                Console(stderr=True).print(log_path.read_text()[-4000:], markup=False)
             process.terminate()
-            process.wait(20)
+            try:
+                process.wait(_STOP_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
 
-def _wait(until: Callable[[], bool], started: float) -> None:
-    while not until():
-        if time.monotonic() - started > _LONGEST_S:
-            raise TimeoutError(f"demo: took more than {_LONGEST_S:.0f} s")
+def _wait(until: Callable[[], bool], service: subprocess.Popen[bytes], step: str) -> None:
+    """Try until a step of the demo is done; a service that is busy or starting is asked again.
+
+    Raises:
+        StartError: the service ended, or has not done the step within `_PATIENCE_S`.
+        httpx.HTTPStatusError: it refuses the request.
+    """
+    until_s = time.monotonic() + _PATIENCE_S
+    while not _done(until):
+        if service.poll() is not None:
+            raise StartError(f"demo: its service ended with {service.returncode}, see above")
+        if time.monotonic() > until_s:
+            raise StartError(
+                f"demo: its service has not {step} within {_PATIENCE_S:.0f} s; try again when the "
+                "machine is less busy"
+            )
         time.sleep(0.2)
+
+
+def _done(until: Callable[[], bool]) -> bool:
+    try:
+        return until()
+    except httpx.TransportError:  # not listening yet, or too busy to answer in time
+        return False
+    except httpx.HTTPStatusError as error:
+        if error.response.status_code in _BUSY:
+            return False
+        raise
 
 
 @contextlib.contextmanager

@@ -1,5 +1,7 @@
 """The settings that a command is given: its flags, above its environment."""
 
+import logging
+import os
 from typing import TYPE_CHECKING, Any
 
 from service.logs import configure_logs
@@ -7,6 +9,9 @@ from service.workers.processes.process import be_private
 
 if TYPE_CHECKING:
     from service.settings import Settings
+
+
+log = logging.getLogger("surefoot.settings")
 
 
 class WrongSettingsError(Exception):
@@ -26,6 +31,14 @@ def begin(**flags: Any) -> "Settings":
     configure_logs()
     be_private()
     return settings_given(**flags)
+
+
+def warn_of_variables() -> None:
+    """Log the environment variables that look like settings and have no effect, without values."""
+    from service.settings import variables_without_effect
+
+    for variable, meant in variables_without_effect(os.environ).items():
+        log.warning("variable_without_effect", extra={"variable": variable, "use": meant})
 
 
 def settings_given(**flags: Any) -> "Settings":

@@ -7,7 +7,8 @@ import time
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.errors import OverloadedError
+from service.data_dir import telling_of
+from service.errors import ServiceError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
 from service.settings import Settings
 from service.store.engines.sqlite import FileLock
@@ -57,9 +58,11 @@ def run_worker(
 
     Raises:
         WorkerRunningError: a worker of this name is running already.
+        StartError: the data directory is missing or cannot be written.
     """
     name = worker_name(settings, name)
-    lock = FileLock(settings.data_dir / f"worker-{name}.lock")
+    with telling_of(settings.data_dir):
+        lock = FileLock(settings.data_dir / f"worker-{name}.lock")
     if not lock.held():
         raise WorkerRunningError(f"name: worker {name!r} is running already")
     settle_allocator()
@@ -113,10 +116,7 @@ def _mind(context: JobContext, name: str) -> int:
                 return exits.GIVEN_UP
             if lost:
                 log.warning("workers_lost", extra={"workers": lost})
-        except (
-            SQLAlchemyError,
-            OverloadedError,
-        ) as error:  # a full disk, say: the store's trouble, not ours
+        except (SQLAlchemyError, ServiceError) as error:  # a full disk, for example
             log.warning("heartbeat_failed", extra={"worker": name, "why": str(error)})
         if draining is not None:
             # A training beyond its own ceiling is not waited for: it would be minutes.

@@ -149,19 +149,6 @@ def reconcile_webhook(session: Session, queue: JobQueue, webhook_id: str) -> Non
         wake(session, queue, webhook, datetime.now(UTC))
 
 
-def follow_clock(session: Session, set_back_by: timedelta) -> int:
-    """Bring forward what waits for a time, after the clock was set back; returns how many."""
-    now = datetime.now(UTC)
-    waiting = webhooks.waiting(session, now)
-    for delivery in waiting:
-        assert delivery.next_attempt_at is not None
-        delivery.next_attempt_at -= set_back_by
-    for webhook in webhooks.enabled(session):
-        if webhook.held_until is not None:
-            webhook.held_until -= set_back_by
-    return len(waiting)
-
-
 def _is_open(webhook: WebhookRecord, now: datetime) -> bool:
     held = webhook.held_until is not None and webhook.held_until > now
     return webhook.enabled and not held

@@ -157,8 +157,10 @@ def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> di
     labels = {"alertname": alert_name(kind), "kind": kind, "severity": severity}
     if camera_id is not None:
         labels["camera_id"] = camera_id
-    elif body.get("track_source"):  # of many cameras; another tracker's is another alert
+    elif body.get("track_source"):  # a group's; other labels make another tracker's another alert
         labels["track_source"] = body["track_source"]
+        if body.get("poster_id"):
+            labels["poster_id"] = body["poster_id"]
     annotations = {
         "summary": alert_summary(kind, camera_id, body.get("camera_ids"), body.get("track_source")),
         "description": body["reason"],

@@ -33,7 +33,7 @@ _ALERT_FIELDS = (
         "escalated_at",
     ),
     *("silenced_until", "silence_reason", "silenced_by", "resolved_at", "resolved_by"),
-    *("outcome", "note", "track_source", "camera_ids", "group_id"),
+    *("outcome", "note", "track_source", "poster_id", "camera_ids", "group_id"),
 )
 # A silenced alert is quiet but for these.
 _TOLD_IN_SILENCE = (MessageType.ALERT_SILENCED, MessageType.ALERT_RESOLVED)

@@ -34,6 +34,8 @@ from service.notifications.keys import require_openable, sealer_of
 from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
+from service.store.engines.revisions import require_known
+from service.store.engines.schemas import require_schema
 
 FORMAT = 1
 MANIFEST = "manifest.json"
@@ -187,6 +189,8 @@ def _gather(settings: Settings, scratch: Path, on_progress: Progress) -> list[st
             "its place by `surefoot restore`"
         )
     require_plain(database, f"backup: {settings.database_path}")
+    require_known(files.revision(database), str(settings.database_path))
+    require_schema(database, str(settings.database_path))
     files.empty(database, ENGINE_TABLES)  # what was queued is queued anew
     files.drop_log(database)
     on_progress("checking the database", 1, 1)

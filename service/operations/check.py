@@ -24,6 +24,7 @@ from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
 from service.store.engines.revisions import known_revisions, require_known
+from service.store.engines.schemas import schema_faults
 
 _LEAST_FREE = 200e6
 
@@ -95,13 +96,16 @@ def _database(path: Path) -> Iterator[Finding]:
     revision, newest = files.revision(path), known_revisions()[0]
     try:
         require_known(revision, path.name)
+        wrong = schema_faults(path)
         old = "" if revision == newest else f"{revision}: the next start migrates it"
-        yield _noted("schema", old, newest)
+        yield _finding("schema", wrong, newest) if wrong else _noted("schema", old, newest)
     except StartError as error:
         yield Finding(what="schema", verdict=Verdict.FAULT, detail=str(error))
     yield _finding("programs", files.programs(path), "no trigger or view but ours", "not ours: ")
     missing = sorted(set(ENGINE_TABLES) - files.tables(path))
-    if missing:
+    if len(missing) == len(ENGINE_TABLES):
+        yield _noted("job engine", "no tables; the next start makes them", "")
+    elif missing:
         yield _finding("job engine", missing, "", "missing: ")
     else:
         pickled = files.jobs_but(path, JOBS_FORM)

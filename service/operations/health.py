@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from service.alerts.bridges import problem_of
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import TrainingState
-from service.errors import OverloadedError
+from service.errors import ServiceError
 from service.settings import Settings
 from service.store import (
     bridges,
@@ -69,7 +69,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
             failing = {camera.id: camera for camera in cameras.failing(session)}
             count = cameras.count(session)
             came = {camera_id: at for camera_id, (_, at) in tracks.unseen_since(session).items()}
-    except (SQLAlchemyError, OverloadedError) as error:
+    except (SQLAlchemyError, ServiceError) as error:
         return _unwritable(error)
     free_mb = shutil.disk_usage(settings.data_dir).free / 2**20
     # A heartbeat of the future is one of before the clock was set back: no sign of life either.
@@ -104,7 +104,7 @@ def check_readiness(store: Store, settings: Settings) -> Readiness:
     )
 
 
-def _unwritable(error: SQLAlchemyError | OverloadedError) -> Readiness:
+def _unwritable(error: SQLAlchemyError | ServiceError) -> Readiness:
     known = failure_of(error) if isinstance(error, SQLAlchemyError) else error
     detail = f"store: {error.__class__.__name__}: {error}" if known is None else known.detail
     return Readiness(problems=(detail if detail.startswith("store: ") else f"store: {detail}",))

@@ -22,7 +22,7 @@ from service.data_dir import (
     sync_folder,
     telling_of,
 )
-from service.job_queue import ENGINE_TABLES
+from service.job_queue import ENGINE_REVISION, ENGINE_TABLES
 from service.notifications.keys import read_key_file, require_openable, sealer_of
 from service.operations.backup import (
     MANIFEST,
@@ -38,6 +38,7 @@ from service.settings import Settings
 from service.store.engines import files
 from service.store.engines.failures import telling_of_database
 from service.store.engines.revisions import require_known
+from service.store.engines.schemas import require_schema
 
 _LARGEST_MANIFEST = 64 * 2**20
 _WEIGHTS = re.compile(r"[0-9a-f]{64}\.safetensors")
@@ -156,7 +157,11 @@ def _check(settings: Settings, manifest: Manifest, folder: Path, on_progress: Pr
         raise StartError("restore: the database of the backup is damaged; take another backup")
     require_known(files.revision(database), "the backup")
     require_plain(database, "restore: the backup's database")
-    files.empty(database, ENGINE_TABLES)
+    require_schema(database, "the backup")
+    if set(ENGINE_TABLES) <= files.tables(database):
+        files.empty(database, ENGINE_TABLES)
+    else:
+        files.drop(database, (*ENGINE_TABLES, ENGINE_REVISION))  # the next start makes them
     files.drop_log(database)
     for digest in set(files.weights_of_models(database).values()) - set(manifest.missing_weights):
         path = weights_path(folder / WEIGHTS, digest)

@@ -32,6 +32,7 @@ from service.store.record import (
     foreign_key,
     newest_first,
 )
+from service.store.sources import Poster
 
 _IS_FIRING = f"state = '{AlertState.FIRING}'"
 
@@ -40,10 +41,11 @@ class AlertRecord(Record):
     """An alert; at most one of a camera and kind is firing.
 
     `evidence` is what an estimate was by that fired it or kept it so: statistics, and no people.
-    `source` tells whether an estimate fired it, which then ends it too, the reference, the camera's
-    rhythm, the upkeep, or a group. A group's alert has no camera but `camera_ids`, and its members
-    have its id as `group_id`; at most one of a `track_source` and kind is firing. `notified` says
-    whether an event told of the alert by itself.
+    `source` is the part of the service that opened it: an estimate, which also ends it, the
+    reference, the camera's rhythm, the upkeep, or a group. A group's alert has `camera_ids` instead
+    of a camera, and its members have its id as `group_id`. `track_source` and `poster_id` identify
+    the poster (`sources.Poster`); at most one group of a poster and kind is firing. `notified` is
+    true once an event was sent for this alert by itself.
     """
 
     __tablename__ = "alerts"
@@ -75,6 +77,7 @@ class AlertRecord(Record):
     resolved_by: Mapped[str | None]
     outcome: Mapped[Outcome | None]
     note: Mapped[str | None]
+    poster_id: Mapped[str] = mapped_column(String(16), default="")
 
     __table_args__ = (
         Index(
@@ -88,6 +91,7 @@ class AlertRecord(Record):
         Index(
             "uq_alerts_firing_group",
             "track_source",
+            "poster_id",
             "kind",
             unique=True,
             sqlite_where=text(f"{_IS_FIRING} AND camera_id IS NULL"),
@@ -230,28 +234,39 @@ def ended(
     ).all()
 
 
-def firing_of_source(
-    session: Session, track_source: str, kinds: Sequence[AlertKind]
+def firing_of_poster(
+    session: Session, poster: Poster, kinds: Sequence[AlertKind]
 ) -> Sequence[AlertRecord]:
-    """The open alerts of some kinds about the cameras of a source of tracks."""
-    query = _all_firing(AlertRecord.track_source == track_source, AlertRecord.kind.in_(kinds))
+    """Return the open alerts of some kinds about the cameras of a poster."""
+    query = _all_firing(*_of_poster(poster), AlertRecord.kind.in_(kinds))
     return session.scalars(query.where(AlertRecord.camera_id.is_not(None))).all()
 
 
-def firing_group(session: Session, track_source: str, kind: AlertKind) -> AlertRecord | None:
-    """The open alert about all of a source of tracks, or None."""
-    query = _all_firing(AlertRecord.track_source == track_source, AlertRecord.kind == kind)
+def firing_group(session: Session, poster: Poster, kind: AlertKind) -> AlertRecord | None:
+    """Return the open group alert of a poster, or None."""
+    query = _all_firing(*_of_poster(poster), AlertRecord.kind == kind)
     return session.scalars(query.where(AlertRecord.camera_id.is_(None))).first()
 
 
-def newest_group(session: Session, track_source: str, kind: AlertKind) -> AlertRecord | None:
-    """The alert about all of a source of tracks that was opened last, or None."""
+def newest_group(session: Session, poster: Poster, kind: AlertKind) -> AlertRecord | None:
+    """Return the group alert of a poster that was opened last, or None."""
     query = select(AlertRecord).where(
-        AlertRecord.camera_id.is_(None),
-        AlertRecord.track_source == track_source,
-        AlertRecord.kind == kind,
+        *_of_poster(poster), AlertRecord.camera_id.is_(None), AlertRecord.kind == kind
     )
     return session.scalars(query.order_by(AlertRecord.opened_at.desc()).limit(1)).first()
+
+
+def group_ended_at(session: Session, poster: Poster, kind: AlertKind) -> datetime | None:
+    """Return when the last group alert of a poster ended, or None."""
+    query = select(func.max(AlertRecord.resolved_at)).where(
+        *_of_poster(poster), AlertRecord.kind == kind, AlertRecord.camera_id.is_(None)
+    )
+    return session.scalar(query)
+
+
+def _of_poster(poster: Poster) -> tuple[ColumnElement[bool], ...]:
+    same_source = AlertRecord.track_source == poster.source
+    return same_source, AlertRecord.poster_id == poster.token_id
 
 
 def firing_members(session: Session, group_id: str) -> Sequence[AlertRecord]:
@@ -285,6 +300,7 @@ def unheeded(session: Session, since: datetime, now: datetime) -> Sequence[Alert
         ActivityRecord.subject_id == AlertRecord.id,
         ActivityRecord.what.in_(TOLD_ANEW),
         ActivityRecord.at > since,
+        ActivityRecord.at <= now,  # not of before the clock was set back
     )
     return session.scalars(
         _waiting(now).where(

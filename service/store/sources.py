@@ -1,12 +1,14 @@
-"""The sources of a camera's tracks."""
+"""Track sources of cameras, and the posters behind them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy import (
     Connection,
     ForeignKey,
     Integer,
+    Select,
     String,
     bindparam,
     delete,
@@ -15,10 +17,12 @@ from sqlalchemy import (
     select,
     update,
 )
-from sqlalchemy.orm import Mapped, Session, mapped_column
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 
+from service.store.cameras import CameraRecord
 from service.store.engines.sqlite import Prepared
 from service.store.record import Record, count_where
+from service.store.references import counting_source
 from service.store.tracks import Spans, TrackRecord, outside
 
 
@@ -40,6 +44,17 @@ class SourceRecord(Record):
     last_seen_at: Mapped[datetime]
     told_at: Mapped[datetime | None]
     token_id: Mapped[str | None] = mapped_column(String(16))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Poster:
+    """The tracker behind a camera: a source name, and the token that posts under it.
+
+    `token_id` is empty if access control is off.
+    """
+
+    source: str
+    token_id: str
 
 
 _TOKEN = bindparam("token", type_=String)
@@ -92,6 +107,52 @@ def find(session: Session, camera_id: str, name: str) -> SourceRecord | None:
 def of_camera(session: Session, camera_id: str) -> Sequence[SourceRecord]:
     """The sources of a camera, the first to post first."""
     return session.scalars(_OF_CAMERA, {"camera": camera_id}).all()
+
+
+def poster_of(session: Session, camera_id: str) -> Poster | None:
+    """Return the poster of the active source; of the newest track's, if no source is active."""
+    name = session.scalar(_feeding_source(camera_id))
+    if name is None:
+        return None
+    record = find(session, camera_id, name)
+    return Poster(source=name, token_id=(record and record.token_id) or "")
+
+
+def cameras_fed_by(session: Session, poster: Poster, received_after: datetime) -> set[str]:
+    """Return the cameras of a poster that received a track after a time."""
+    received = (
+        select(func.max(TrackRecord.received_at))
+        .where(TrackRecord.camera_id == CameraRecord.id)
+        .scalar_subquery()
+    )
+    token_id = (
+        select(SourceRecord.token_id)
+        .where(SourceRecord.camera_id == CameraRecord.id, SourceRecord.name == poster.source)
+        .scalar_subquery()
+    )
+    return set(
+        session.scalars(
+            select(CameraRecord.id).where(
+                _feeding_source(CameraRecord.id).scalar_subquery() == poster.source,
+                func.coalesce(token_id, "") == poster.token_id,
+                received > received_after,
+            )
+        )
+    )
+
+
+def _feeding_source(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:
+    newest = (
+        select(TrackRecord.source)
+        .where(TrackRecord.camera_id == camera_id)
+        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
+        .limit(1)
+    )
+    if not isinstance(camera_id, str):
+        newest = newest.correlate(camera_id.class_)
+    return select(
+        func.coalesce(counting_source(camera_id).scalar_subquery(), newest.scalar_subquery())
+    )
 
 
 def newest_end_s(session: Session, camera_id: str, name: str) -> float | None:

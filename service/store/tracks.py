@@ -17,16 +17,17 @@ from sqlalchemy import (
     Index,
     LargeBinary,
     Result,
-    Select,
     SQLColumnExpression,
     String,
     UniqueConstraint,
     bindparam,
     case,
+    exists,
     func,
     select,
+    update,
 )
-from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
+from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, aliased, mapped_column
 
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
@@ -182,21 +183,6 @@ def counting(camera_id: str | BindParameter[str]) -> list[ColumnElement[bool]]:
     return [TrackRecord.camera_id == camera_id, of_counting_source(camera_id)]
 
 
-def newest_source_of(camera_id: str | InstrumentedAttribute[str]) -> Select[str]:
-    """The source that counts; where none does, that of the newest track."""
-    newest = (
-        select(TrackRecord.source)
-        .where(TrackRecord.camera_id == camera_id)
-        .order_by(TrackRecord.ended_s.desc(), TrackRecord.id.desc())
-        .limit(1)
-    )
-    if not isinstance(camera_id, str):
-        newest = newest.correlate(camera_id.class_)
-    return select(
-        func.coalesce(counting_source(camera_id).scalar_subquery(), newest.scalar_subquery())
-    )
-
-
 def started_from(camera_id: str, started_from_s: float | None) -> list[ColumnElement[bool]]:
     """The conditions that a track counts and started at or after a time."""
     conditions = counting(camera_id)
@@ -305,28 +291,6 @@ def count_since(session: Session, camera_id: str, ended_after_s: float | None) -
     return count_where(session, *counting(camera_id), *after)
 
 
-def newest_source(session: Session, camera_id: str) -> str | None:
-    """The source that counts; where none does yet, that of the newest track."""
-    return session.scalar(newest_source_of(camera_id))
-
-
-def cameras_fed_by(session: Session, source: str, received_after: datetime) -> set[str]:
-    """The cameras for which a source counts, of those that got a track after a time."""
-    received = (
-        select(func.max(TrackRecord.received_at))
-        .where(TrackRecord.camera_id == CameraRecord.id)
-        .scalar_subquery()
-    )
-    return set(
-        session.scalars(
-            select(CameraRecord.id).where(
-                newest_source_of(CameraRecord.id).scalar_subquery() == source,
-                received > received_after,
-            )
-        )
-    )
-
-
 def newest_pk(session: Session, camera_id: str) -> int | None:
     """The track that was stored last."""
     return session.scalar(_NEWEST_PK, {"camera": camera_id})
@@ -423,3 +387,50 @@ def unseen_since(session: Session) -> dict[str, tuple[int, datetime]]:
         )
     )
     return {camera_id: (pk, received_at) for camera_id, pk, received_at in rows}
+
+
+_OTHER = aliased(TrackRecord)
+_MOVED = (
+    update(TrackRecord.__table__)  # type: ignore[arg-type]
+    .where(
+        TrackRecord.id == bindparam("pk"),
+        ~exists().where(
+            _OTHER.camera_id == TrackRecord.camera_id,
+            _OTHER.source == TrackRecord.source,
+            _OTHER.track_id == TrackRecord.track_id,
+            _OTHER.started_s == bindparam("new_started_s"),
+        ),
+    )
+    .values(
+        points=bindparam("new_points"),
+        started_s=bindparam("new_started_s"),
+        ended_s=bindparam("new_ended_s"),
+    )
+)
+_MOVED_AT_ONCE = 500
+
+
+def follow_clock(session: Session, back_s: int, limit_s: float) -> int:
+    """Move the times of tracks that end after `limit_s` back; return how many there were.
+
+    A track is deleted if another track of its name has its new start time already.
+    """
+    ahead = TrackRecord.camera_id.in_(select(CameraRecord.id)), TrackRecord.ended_s > limit_s
+    found = session.scalars(select(TrackRecord.id).where(*ahead)).all()
+    for at in range(0, len(found), _MOVED_AT_ONCE):
+        chosen = TrackRecord.id.in_(found[at : at + _MOVED_AT_ONCE])
+        rows = session.execute(select(TrackRecord.id, TrackRecord.points).where(chosen))
+        session.connection().execute(_MOVED, [_moved(pk, data, back_s) for pk, data in rows])
+    delete_some(session, TrackRecord.id, select(TrackRecord.id).where(*ahead))
+    return len(found)
+
+
+def _moved(track_pk: int, data: bytes, back_s: int) -> dict[str, Any]:
+    points = unpack(data, 3)
+    points[:, 0] -= back_s
+    return {
+        "pk": track_pk,
+        "new_points": pack(points),
+        "new_started_s": float(points[0, 0]),
+        "new_ended_s": float(points[-1, 0]),
+    }

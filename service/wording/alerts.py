@@ -96,10 +96,13 @@ _ANSWERS = {
     },
     AlertKind.MANY_MOVED: {
         Answer.MENDED: N_(
-            "The tracker, its clock or frame rate is as it should be. At each of its cameras the "
-            "next people tell."
+            "The tracker, its clock or frame rate is as it should be. Its cameras are monitored "
+            "again; cameras that turned keep their alerts."
         ),
-        Answer.FALSE_ALARM: N_("Nothing was wrong. At each of its cameras the next people tell."),
+        Answer.FALSE_ALARM: N_(
+            "Nothing was wrong. Its cameras are monitored again; cameras that turned keep their "
+            "alerts."
+        ),
     },
     AlertKind.MANY_SILENT: {
         Answer.MENDED: N_("The tracker was repaired. Should it go on, another alert opens."),

@@ -2,6 +2,7 @@
 
 Each goes to a real service, which starts anew for it: seconds until the answer, the peak of memory,
 and the longest wait of `/healthz` meanwhile. No process may take more than `--limit-mb`.
+With SUREFOOT_TEST_DATABASE=postgresql it runs on a server of its own.
 """
 
 import argparse
@@ -18,11 +19,11 @@ import psutil
 from rich.console import Console
 from rich.table import Table
 
-from service.commands.migrate import migrate
 from service.settings import Settings
 from tests.benchmarks.parts.health_probe import probing
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
+from tests.stores import databases
 
 SIZE = 32 * 2**20
 JSON, NDJSON, CSV = "application/json", "application/x-ndjson", "text/csv"
@@ -127,10 +128,8 @@ class Cost:
     idle_ms: float
 
 
-def measure(folder: Path, limit_mb: int, kind: str, body: bytes) -> Cost:
+def measure(settings: Settings, limit_mb: int, kind: str, body: bytes) -> Cost:
     """Post a body to a service of its own, and ask from another process how it is meanwhile."""
-    settings = Settings(data_dir=folder / "data", workers=0, port=free_port())
-    migrate(settings)
     running = RunningService(settings)
     running.start()
     try:
@@ -171,8 +170,11 @@ def main() -> None:
     for name, (kind, made) in BODIES.items():
         if asked.names and name not in asked.names:
             continue
-        with tempfile.TemporaryDirectory() as folder:
-            cost = measure(Path(folder), asked.limit_mb, kind, made())
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            databases.fresh(Path(folder), workers=0, port=free_port()) as settings,
+        ):
+            cost = measure(settings, asked.limit_mb, kind, made())
         numbers = (cost.took_s, cost.before_mb, cost.peak_mb, cost.health_ms, cost.idle_ms)
         row = [f"{number:.2f}" if number < 10 else f"{number:.0f}" for number in numbers]
         sys.stderr.write(f"{name}: {cost.answer} {' '.join(row)}\n")

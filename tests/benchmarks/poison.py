@@ -3,6 +3,7 @@
 Two cameras of one worker have learned their streets. Six points over 30 days and over 20 years are
 refused over HTTP and put into the store of one, as a store from elsewhere may hold them; more
 people wake its look. Then the other is turned by 8 deg. Exits with 1 beyond the limits.
+With SUREFOOT_TEST_DATABASE=postgresql it runs on a server of its own.
 """
 
 import argparse
@@ -16,13 +17,12 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from service.commands.migrate import migrate
 from service.formats.track import IncomingTrack
-from service.settings import Settings
 from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
 from tests.service.street import PRIOR, Street
+from tests.stores import databases
 from tests.stores.rows import put_tracks
 
 KNOCKED = replace(PRIOR, tilt_rad=PRIOR.tilt_rad + math.radians(8))
@@ -77,11 +77,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--without", action="store_true", help="the same without the poison")
     asked = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(
-            data_dir=Path(folder) / "data", port=free_port(), workers=1, trainings="off"
-        )
-        migrate(settings)
+    values = {"port": free_port(), "workers": 1, "trainings": "off"}
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        databases.fresh(Path(folder), **values) as settings,
+    ):
         running = RunningService(settings, forked=False)
         running.start()
         try:

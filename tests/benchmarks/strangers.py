@@ -2,6 +2,7 @@
 
 They come from four addresses and say `--rate` bytes a second each; meanwhile new connections ask
 for `/healthz` without a token and for `/cameras` with one, and post bodies of 0.9 MB.
+With SUREFOOT_TEST_DATABASE=postgresql it runs on a server of its own.
 """
 
 import argparse
@@ -18,12 +19,11 @@ import httpx
 
 from service.access import tokens
 from service.access.tokens import TokenSpec
-from service.commands.migrate import migrate
-from service.settings import Settings
 from service.store.engines.store import Store
 from tests.benchmarks.bodies import SIZE, honest
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port
+from tests.stores import databases
 
 _HEAD = (
     b"POST /ui/login HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n"
@@ -63,9 +63,11 @@ def main() -> None:
     parser.add_argument("--rate", type=int, default=2_048)
     parser.add_argument("--seconds", type=float, default=40.0)
     asked = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(data_dir=Path(folder) / "data", workers=0, port=free_port(), auth="on")
-        migrate(settings)
+    values = {"workers": 0, "port": free_port(), "auth": "on"}
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        databases.fresh(Path(folder), **values) as settings,
+    ):
         with Store(settings).write() as session:
             spec = TokenSpec(name="ada", scopes=("admin", "ingest"))
             bearer = {"Authorization": f"Bearer {tokens.make_token(session, spec, None).text}"}

@@ -49,6 +49,16 @@ def test_every_variable_is_a_setting(path):
     assert named >= SHARED
 
 
+@pytest.mark.parametrize("name", ["surefoot-api", "surefoot-worker"])
+def test_pods_get_no_variables_of_the_service_that_are_read_as_settings(name):
+    """Kubernetes sets SUREFOOT_PORT=tcp://... for a Service of this name: no worker started."""
+    service = documents()["Service", "surefoot"]["metadata"]["name"]
+    with pytest.raises(ValueError, match="port"):
+        Settings.model_validate({"port": "tcp://10.0.0.7:80"})
+    assert f"{service.upper()}_PORT" in SETTINGS
+    assert pod(name)["enableServiceLinks"] is False
+
+
 def test_every_command_and_its_flags_are_real():
     commands = [services()[name]["command"] for name in ("api", "worker")]
     commands += [container(name)["command"] for name in ("surefoot-api", "surefoot-worker")]

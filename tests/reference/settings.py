@@ -7,6 +7,7 @@ _HEAD = """\
 
 Each is an environment variable, `SUREFOOT_` and its name, of `serve`, `worker` and the other
 commands. A wrong value is told at the start, with exit code 2. Booleans are `true` and `false`.
+`serve` and `worker` log `variable_without_effect` for a name without the prefix or misspelled.
 The common ones are flags of `surefoot serve`, too.
 
 | Setting | Default | Meaning |

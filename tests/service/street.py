@@ -15,6 +15,7 @@ from models.simulation.poses import repeated_pose
 from models.simulation.walkers import WalkConfig, simulate_walks
 from models.tracks.trajectory import Trajectory
 from service.job_queue import JobQueue
+from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
 from service.workers.context import JobContext
 from service.workers.estimate import run_estimate
@@ -143,8 +144,11 @@ class Street:
         assert answer.json()["accepted"] == len(self._bodies), answer.text
         self._bodies.clear()
 
-    def look(self) -> dict[str, Any]:
-        """Run the estimate job; returns the served pose."""
+    def look(self, *, full: bool = False) -> dict[str, Any]:
+        """Run the estimate job, as for an open page if it is to be a `full` one; return the pose."""
+        if full:
+            with self.context.store.write() as session:
+                session.get_one(CameraRecord, self.camera_id).full_estimate_asked = True
         run_estimate(self.context, self.camera_id)
         return self.pose()
 

@@ -50,6 +50,20 @@ def make_template(folder: Path) -> None:
 
 
 @contextmanager
+def fresh(folder: Path, **values: Any) -> Iterator[Settings]:
+    """Settings of a migrated store of its own, for a script: a file, or a server by the switch."""
+    begin_run()
+    try:
+        url = server()
+        made = None if url is None else servers.make(url, "surefoot")
+        settings = Settings(data_dir=folder / "data", database_url=made, **values)
+        migrate(settings)
+        yield settings
+    finally:
+        end_run()
+
+
+@contextmanager
 def settled(template: Path, folder: Path, **values: Any) -> Iterator[Settings]:
     """Settings of a data directory like another one, with a database of its own."""
     shutil.copytree(template, folder)

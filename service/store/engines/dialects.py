@@ -52,6 +52,13 @@ class as_json(FunctionElement[str]):  # noqa: N801
     name = "as_json"
 
 
+class earlier(FunctionElement[datetime]):  # noqa: N801
+    """A time less a whole number of seconds; its microseconds stay."""
+
+    inherit_cache = True
+    name = "earlier"
+
+
 class NewRows(Insert):
     """An insert that leaves out what is stored already."""
 
@@ -93,6 +100,20 @@ def _as_json(element: as_json, compiler: SQLCompiler, **kw: Any) -> str:
 @compiles(as_json, _POSTGRESQL)
 def _as_text(element: as_json, compiler: SQLCompiler, **kw: Any) -> str:
     return f"({compiler.process(element.clauses, **kw)})::text"
+
+
+@compiles(earlier)
+def _earlier(element: earlier, compiler: SQLCompiler, **kw: Any) -> str:
+    time, seconds = (compiler.process(each, **kw) for each in element.clauses)
+    # SQLite calculates to milliseconds alone: what is behind the point is taken as it is.
+    whole_s = f"strftime('%Y-%m-%d %H:%M:%S', {time}, -{seconds} || ' seconds')"
+    return f"{whole_s} || substr({time}, 20)"
+
+
+@compiles(earlier, _POSTGRESQL)
+def _before(element: earlier, compiler: SQLCompiler, **kw: Any) -> str:
+    time, seconds = (compiler.process(each, **kw) for each in element.clauses)
+    return f"{time} - make_interval(secs => {seconds})"
 
 
 @compiles(NewRows)

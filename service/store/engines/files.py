@@ -128,6 +128,15 @@ def empty(path: Path, names: Sequence[str]) -> None:
         connection.execute("COMMIT")
 
 
+def drop(path: Path, names: Sequence[str]) -> None:
+    """Drop tables, if they exist."""
+    with connected(path) as connection:
+        connection.execute("BEGIN IMMEDIATE")
+        for name in names:
+            connection.execute(f"DROP TABLE IF EXISTS {name}")
+        connection.execute("COMMIT")
+
+
 def jobs_but(path: Path, form: str) -> int:
     """The number of the engine's jobs that are not written in a form."""
     if "workflow_status" not in tables(path):

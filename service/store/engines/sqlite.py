@@ -1,6 +1,8 @@
 """A store in an SQLite file: connections, one writer after the other, prepared statements."""
 
 import fcntl
+import logging
+import os
 import sqlite3
 import threading
 import time
@@ -27,8 +29,10 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.sql.compiler import SQLCompiler
 
 from service.data_dir import make_file
-from service.errors import OverloadedError
+from service.errors import OverloadedError, StoreUnavailableError
 from service.store.engines.pooled import pooled_engine
+
+log = logging.getLogger("surefoot.store")
 
 
 class Turns:
@@ -203,7 +207,10 @@ class Sqlite:
     def __init__(self, url: str, patience_s: float, connections: int) -> None:
         self._path = Path(make_url(url).database or "")
         make_file(self._path)
+        self._opened: tuple[int, int] | None = None  # device and inode of the file in use
+        self._replaced = False
         self.engine = sqlite_engine(url, patience_s, connections)
+        event.listen(self.engine, "connect", self._note_file)
         self.reading = self.engine
         self.connections = connections
         self._patience_s = patience_s
@@ -223,7 +230,9 @@ class Sqlite:
 
         Raises:
             OperationalError: other processes had it for longer than the patience lasts.
+            StoreUnavailableError: the path no longer names the open file.
         """
+        self._require_file()
         until_s = time.monotonic() + self._patience_s
         _HASTY.run(connection)
         try:
@@ -234,7 +243,12 @@ class Sqlite:
 
     @contextmanager
     def looking(self) -> Iterator[Connection]:
-        """A connection that refuses to write: nobody is kept from writing by it."""
+        """A connection that refuses to write, so that others can write meanwhile.
+
+        Raises:
+            StoreUnavailableError: the path no longer names the open file.
+        """
+        self._require_file()
         with self.engine.connect() as connection:
             _LOOK_ONLY.run(connection)
             try:
@@ -247,9 +261,36 @@ class Sqlite:
         """True of an error that says that a connection was only to look."""
         return _is(error, sqlite3.SQLITE_READONLY)
 
+    def _note_file(self, *_: Any) -> None:
+        # The first connection's: a later one may already have opened another file.
+        if self._opened is None:
+            self._opened = _identity(self._path)
+
+    def _require_file(self) -> None:
+        # A deleted file stays open. Writes to it succeed, and are lost when the process ends.
+        replaced = self._opened is not None and self._opened != _identity(self._path)
+        if replaced and not self._replaced:
+            log.error("store_replaced", extra={"path": str(self._path)})
+        self._replaced = replaced
+        if replaced:
+            raise StoreUnavailableError(
+                f"store: {self._path} was deleted or replaced while the service was running; put "
+                "the file back or restart the service; nothing was stored",
+                retry_after_s=10,
+            )
+
     def lock(self, name: str) -> FileLock:
         """A lock that one process of this machine has."""
         return FileLock(self._path.with_name(f"{name}.lock"))
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Device and inode of the file at a path; None if there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _begun(connection: Connection, until_s: float) -> bool:

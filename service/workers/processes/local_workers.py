@@ -11,7 +11,7 @@ from typing import IO, Self
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.errors import OverloadedError
+from service.errors import ServiceError
 from service.interpreter import command_of
 from service.settings import Settings
 from service.store.engines.store import Store
@@ -102,7 +102,7 @@ class LocalWorkers:
         try:
             with self._store.write(WORKERS) as session:
                 note_trouble(session, name, trouble)
-        except (SQLAlchemyError, OverloadedError) as error:
+        except (SQLAlchemyError, ServiceError) as error:
             log.warning("trouble_not_noted", extra={"worker": name, "why": str(error)})
 
 

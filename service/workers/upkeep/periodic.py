@@ -19,9 +19,11 @@ from models.durations import HOUR_S
 from service.alerts.arrival_models import compute_arrival_model, load_arrivals, save_arrival_model
 from service.alerts.staleness import StaleWatch
 from service.data_dir import ROUNDS
-from service.notifications import deliveries
+from service.errors import ServiceError
 from service.store import cameras
+from service.store.engines.dialects import now_in
 from service.store.engines.store import Lock
+from service.store.stamps import follow_clock
 from service.workers import engine
 from service.workers.context import UPKEEP, JobContext
 from service.workers.processes.workers import take_setback
@@ -61,6 +63,8 @@ class Periodic:
         try:
             with nullcontext() if self.steps else context.running.job(UPKEEP, self.name):
                 self.do()
+        except ServiceError as error:  # a full disk, for example
+            log.warning("round_failed", extra={"round": self.name, "why": error.detail})
         except Exception:
             log.exception("round_failed", extra={"round": self.name})
         self.due_s = time.monotonic() + self.every_s
@@ -142,7 +146,7 @@ class ClockWatch:
         back_s = self._ahead_s - ahead_s
         if back_s >= _JUMP_S:
             with context.store.write() as session:
-                _follow(session, timedelta(seconds=back_s))
+                _follow(context, session, timedelta(seconds=back_s))
         self._ahead_s = ahead_s  # not before: where nothing could be written, it is seen again
 
 
@@ -151,12 +155,14 @@ def follow_clock_since_last_run(context: JobContext) -> None:
     with context.store.write() as session:
         back = take_setback(session)
         if back.total_seconds() >= _JUMP_S:
-            _follow(session, back)
+            _follow(context, session, back)
 
 
-def _follow(session: Session, back: timedelta) -> None:
-    moved = deliveries.follow_clock(session, back)
-    log.warning("clock_set_back", extra={"by_s": round(back.total_seconds()), "deliveries": moved})
+def _follow(context: JobContext, session: Session, back: timedelta) -> None:
+    now = now_in(session)
+    moved = follow_clock(session, back, now, context.settings.max_ahead_s)
+    context.queue.follow_clock(session, back, now)
+    log.warning("clock_set_back", extra={"by_s": round(back.total_seconds()), "times": moved})
 
 
 def run_arrival_models(context: JobContext) -> None:

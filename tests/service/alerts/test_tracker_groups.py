@@ -14,6 +14,7 @@ from service.store import alerts, journal, webhooks
 from service.store.alerts import AlertRecord
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
+from service.store.sources import Poster
 from service.store.tracks import TrackRecord
 from service.workers.upkeep import reconciliation
 from tests.conftest import CAMERA, track
@@ -263,12 +264,10 @@ def test_one_is_open_for_a_source_whatever_happens(town):
     for n in range(3):
         town.moves(n)
     with town.store.write() as session:
-        group = alerts.firing_group(session, "bytetrack", "many_moved")
+        group = alerts.firing_group(session, Poster(source="bytetrack", token_id=""), "many_moved")
         values = {c.key: getattr(group, c.key) for c in AlertRecord.__mapper__.column_attrs}
         session.add(AlertRecord(**values | {"id": "b" * 32}))
-        with pytest.raises(
-            IntegrityError, match="alerts.track_source, alerts.kind|uq_alerts_firing_group"
-        ):
+        with pytest.raises(IntegrityError, match="UNIQUE.*alerts.poster_id|uq_alerts_firing_group"):
             session.flush()
         session.rollback()
 

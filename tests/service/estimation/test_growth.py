@@ -300,12 +300,12 @@ def test_a_map_with_tracks_of_a_move_in_it_is_learned_without_them(known):
     with known.context.store.write() as session:
         session.add(put_back(moved_s))
     known.keep_to_lanes(PRIOR, 1)
-    known.look()
+    known.look(full=True)
     again = map_of(known)
     assert again.tracks == WANTED + 29
     assert again.to_s < moved_s
     known.keep_to_lanes(PRIOR, 1)
-    known.look()
+    known.look(full=True)
     assert map_of(known).learned_at == again.learned_at
 
 

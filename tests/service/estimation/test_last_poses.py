@@ -28,7 +28,7 @@ def test_the_next_estimate_begins_at_the_last_and_comes_to_the_same(laned):
     laned.keep_to_lanes(PRIOR, 170)
     laned.look()
     laned.keep_to_lanes(PRIOR, 5)
-    evidence = evidence_of(laned)
+    evidence = replace(evidence_of(laned), asked=True)
     found, full = (compute_estimate(each, 0) for each in (evidence, replace(evidence, last=None)))
     before, after = (warm_start_from_bytes(each.last.data) for each in (evidence, found))
     assert after.search.to_s == before.search.to_s < evidence.tracks[-1].ended_s  # no others tried

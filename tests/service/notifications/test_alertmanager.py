@@ -256,8 +256,10 @@ def test_a_group_is_told_as_one_alert_of_its_tracker(post_room):
         "camera_id": None,
         "camera_ids": ["a", "b", "c"],
         "track_source": "bytetrack",
+        "poster_id": "3f9c01d2ab44",
     }
     (alert,) = postable_alerts(body, None, changed=False)
     assert alert["labels"]["track_source"] == "bytetrack"
+    assert alert["labels"]["poster_id"] == "3f9c01d2ab44"
     assert "camera_id" not in alert["labels"]
     assert alert["annotations"]["summary"] == "many moved: 3 cameras of bytetrack"
