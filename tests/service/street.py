@@ -145,7 +145,7 @@ class Street:
         self._bodies.clear()
 
     def look(self, *, full: bool = False) -> dict[str, Any]:
-        """Run the estimate job, as for an open page if it is to be a `full` one; return the pose."""
+        """Run the estimate job, a `full` one if wanted; return the served pose."""
         if full:
             with self.context.store.write() as session:
                 session.get_one(CameraRecord, self.camera_id).full_estimate_asked = True
