@@ -38,3 +38,5 @@ class TracksCode(StrEnum):
     STATURE_UNUSUAL = "stature_unusual"
     PRIOR_POSE_DOUBTED = "prior_pose_doubted"
     PIECES = "pieces"
+    IMAGE_SHARES = "image_shares"
+    OTHER_IMAGE_SIZE = "other_image_size"

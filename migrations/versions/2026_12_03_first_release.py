@@ -110,6 +110,7 @@ table(
     *optional(DateTime, "snapshot_due_at"),
     *optional(String, "snapshot_error"),
     *needed(DateTime, "created_at", "updated_at"),
+    *optional(JSON, "image_sizes"),
 )
 table(
     "prior_poses",
@@ -195,6 +196,7 @@ table(
     *needed(LargeBinary, "points"),
     *optional(LargeBinary, "boxes", "heads"),
     *needed(DateTime, "received_at"),
+    *optional(NUMBER, "first_px"),
     sa.UniqueConstraint("camera_id", "source", "track_id", "started_s"),
     Index(None, "camera_id", "ended_s", "source"),
     Index(None, "camera_id", "id"),

@@ -1,5 +1,6 @@
 """`POST /cameras/{id}/tracks` in all its forms."""
 
+import json
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import nullcontext
@@ -26,7 +27,7 @@ from service.errors import MalformedError, ServiceError, UnsupportedMediaTypeErr
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
 from service.formats.mot import read_classes, read_mot
-from service.formats.scaling import read_size
+from service.formats.scaling import image_sizes_of, read_size
 from service.formats.track import Batch, Clock, Limits
 from service.store.cameras import Picture
 
@@ -176,6 +177,7 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
         now_s=time.time(),
         max_ahead_s=state.settings.max_ahead_s,
         fisheye=camera.fisheye,
+        image_sizes=image_sizes_of(json.loads(camera.image_sizes or "null")),
     )
     try:
         size = None if came.size is None else read_size(came.size)

@@ -15,6 +15,7 @@ from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
 from service.cameras.held_poses import held_pose, keep_drawn
+from service.cameras.image_sizes import declare_size, declared_size, forget_frame_size
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
 from service.enums import Activity, AlertState, Origin, Outcome, PoseState
@@ -25,6 +26,7 @@ from service.errors import (
     check_version,
 )
 from service.estimate_queue import request_estimate
+from service.formats.scaling import ImageSize
 from service.job_queue import JobQueue
 from service.notifications.events import tell_of_camera
 from service.references import begin_reference
@@ -71,11 +73,15 @@ class CameraChange:
     walking_speed_sd_mps: float | None = None
     reference_tracks: int | None = None
     snapshot_url: str | None = None
+    image_size: ImageSize | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraView:
-    """A camera as clients see it; `calibrated` once somebody has said or agreed to a prior pose."""
+    """A camera as clients see it; `calibrated` once somebody has said or agreed to a prior pose.
+
+    `image_size` is declared for the active source of its tracks.
+    """
 
     record: CameraRecord
     prior_pose: CameraPose
@@ -84,6 +90,7 @@ class CameraView:
     model_id: str | None
     state: PoseState
     reference: ReferenceView
+    image_size: ImageSize | None
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -202,8 +209,11 @@ def change_camera(
 ) -> CameraView:
     """Change a camera; another lens or prior pose queues a training.
 
+    Another image size of its tracks rescales those that are stored; its reference is learned anew.
+
     Raises:
         NotFoundError: there is none of that id.
+        ConflictError: an image size, and the camera has no tracks yet.
         PreconditionFailedError: it was changed since the client read it.
         PreconditionRequiredError: the client does not say what it has read.
     """
@@ -217,7 +227,7 @@ def change_camera(
     lens = {} if change.intrinsics is None else _columns(change.intrinsics)
     size = record.width, record.height
     for name, value in {**changed, **lens}.items():
-        if name not in ("intrinsics", "prior_pose"):
+        if name not in ("intrinsics", "prior_pose", "image_size"):
             setattr(record, name, value)
     record.name, record.site = record.name or record.id, record.site or None
     if change.snapshot_url is not None:
@@ -231,11 +241,18 @@ def change_camera(
         request_estimate(session, queue, camera_id)
     geometry_changed = change.intrinsics is not None or change.prior_pose is not None
     speed_changed = "walking_speed_mean_mps" in changed or "walking_speed_sd_mps" in changed
-    if geometry_changed or speed_changed:
+    if (record.width, record.height) != size:
+        forget_frame_size(record, size)
+    rescaled = False
+    if change.image_size is not None:
+        rescaled = declare_size(session, record, change.image_size, by)
+        request_estimate(session, queue, camera_id)
+    if geometry_changed or speed_changed or rescaled:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
             close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, by))
-        # Tracks seen so far may be of another pose or lens, but not of other people.
+        # Tracks seen so far may be of another pose or lens, but not of other people; those that
+        # were rescaled are of the same pose.
         from_s = reference.from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
@@ -383,6 +400,7 @@ def _views(
             model_id=model_id,
             state=statuses[record.id].state,
             reference=views[record.id],
+            image_size=declared_size(record, statuses[record.id].reference.source),
         )
         for record, prior, model_id in cameras.all_as_set_up(session, statuses.keys())
     ]

@@ -2,7 +2,7 @@
 
 import re
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from io import BytesIO, TextIOWrapper
 from itertools import islice, repeat
@@ -97,7 +97,8 @@ def read_mot(
     whole = ~np.isin(of, [lines.names[name] for name in lines.broken])
     left_out = int((whole & ~kept).sum())
     kept &= whole
-    boxes = _boxes(numbers[kept], clock, first=0 if limits.normalised else 1)
+    limits = replace(limits.of_source(source), first_px=1)
+    boxes = _boxes(numbers[kept], clock, first=0 if limits.normalised else limits.first_px)
     of = of[kept]
     ordered = np.lexsort((boxes[:, 0], of))
     boxes = boxes[ordered]

@@ -54,7 +54,8 @@ class CameraRecord(Record):
     `estimate_error` says why and `estimate_failing_since` since when. None is begun before
     `estimate_after`. `lacks` says what failed beside the served estimate. A picture is asked of
     `snapshot_url` at `snapshot_due_at`, at once where that is None; `snapshot_error` is why the
-    last one did not come. `site` is a path, None where nobody has said one.
+    last one did not come. `site` is a path, None where nobody has said one. `image_sizes` has the
+    declared size (width, height) of the images that a source's numbers belong to, None for shares.
     """
 
     __tablename__ = "cameras"
@@ -88,6 +89,7 @@ class CameraRecord(Record):
     snapshot_error: Mapped[str | None]
     created_at: Mapped[datetime]
     updated_at: Mapped[datetime]
+    image_sizes: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -212,6 +214,7 @@ _AWAITED = Prepared(
         CameraRecord.height,
         CameraRecord.frame_rate_hz,
         type_coerce(CameraRecord.projection, String),
+        cast(CameraRecord.image_sizes, String),
     ).where(CameraRecord.id == bindparam("camera"))
 )
 
@@ -220,13 +223,15 @@ _AWAITED = Prepared(
 class Picture:
     """The pictures of a camera: their size, and how many a second, where that is known.
 
-    `fisheye` is the lens, where it has no picture of some pixels.
+    `fisheye` is the lens, where it has no picture of some pixels. `image_sizes` are declared for
+    sources, as JSON.
     """
 
     width: int
     height: int
     frame_rate_hz: float | None
     fisheye: Intrinsics | None
+    image_sizes: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,7 +252,13 @@ def awaited(connection: Connection, camera_id: str) -> Awaited | None:
     if row is None:
         return None
     fisheye = None if row[5] == Projection.PERSPECTIVE else _lens(connection, camera_id)
-    seen = Picture(width=row[2], height=row[3], frame_rate_hz=row[4], fisheye=fisheye)
+    seen = Picture(
+        width=row[2],
+        height=row[3],
+        frame_rate_hz=row[4],
+        fisheye=fisheye,
+        image_sizes=row[6],
+    )
     return Awaited(look=bool(row[0]), source=bool(row[1]), picture=seen)
 
 
