@@ -53,7 +53,7 @@ STRANGERS_S = 5.0  # at the usual pace: two are at least as far apart by chance
 MANY_PIECES = 0.1  # of the tracks: so many are worth a word
 
 # Shares of the image that were posted as pixels
-SHARES_FEWEST = 5  # tracks: as many as an estimate needs
+SHARES_FEWEST = 1  # tracks: nobody walks within a pixel
 SHARES_PX = (-1.25, 1.5)  # MOT text counts pixels from 1, and feet may lie below the image
 
 # Another image size than the frame's (`image_size`): chosen on 17 recordings, scaled and cropped

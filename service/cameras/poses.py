@@ -63,12 +63,13 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         raise no_camera(camera_id)
     camera, prior, model_id = set_up
     status = camera_statuses(session, settings, (camera_id,))[camera_id]
-    in_doubt = status.reference.ready_at is None and bool(status.reference.doubts)
-    if in_doubt:
-        status = replace(status, estimate=None)  # it is from the tracks in doubt
+    if status.in_question:
+        status = replace(status, estimate=None)  # it is from the tracks in question
     reference = reference_views(session, settings, {camera_id: status})[camera_id]
     pose, calibrated = prior.pose, not prior.assumed
-    proposed = None if calibrated or in_doubt else proposal_of(session, prior, camera.intrinsics)
+    proposed = (
+        None if calibrated or status.in_question else proposal_of(session, prior, camera.intrinsics)
+    )
     reasons = _reasons_of(session, settings, status, reference, proposed)
     if proposed is not None:
         pose = proposed.pose
@@ -137,7 +138,7 @@ def _reasons_of(
             found += [Reason(code=ServiceCode.LAST_IDENTIFIABLE), *estimate.reasons]
         else:
             found += _of_alerts(status)
-    if status.reference.ready_at is None:
+    if status.in_question:
         found += status.reference.doubts
     if status.state == PoseState.UNCALIBRATED:
         found.append(_why_uncalibrated(status, learned, proposed))

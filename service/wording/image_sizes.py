@@ -13,7 +13,7 @@ def question_words(reason: Reason) -> str:
     if reason.code == TracksCode.IMAGE_SHARES:
         asked = _("Are the tracks in shares of the image?")
     else:
-        size = f"{reason.values['width_px']} x {reason.values['height_px']}"
+        size = _size(reason.values["width_px"], reason.values["height_px"])
         asked = _("Are the tracks in pixels of a {size} image?", size=size)
     why = in_words((reason,))
     wait = _("Nothing is learned from them until you answer.")
@@ -24,11 +24,13 @@ def fix_words(fix: Mapping[str, Any]) -> str:
     """The label of a button that rescales tracks."""
     if "tracks_size" not in fix:
         return _("Yes, rescale from shares")
-    width, height = fix["tracks_size"]
-    return _("Yes, rescale from {size}", size=f"{width} x {height}")
+    return _("Yes, rescale from {size}", size=_size(*fix["tracks_size"]))
 
 
 def keep_words(keep: Mapping[str, Any]) -> str:
     """The label of the button that confirms pixels of the frame."""
-    width, height = keep["tracks_size"]
-    return _("No, keep {size} pixels", size=f"{width} x {height}")
+    return _("No, keep {size} pixels", size=_size(*keep["tracks_size"]))
+
+
+def _size(width: Any, height: Any) -> str:
+    return _("{width} x {height}", width=width, height=height)

@@ -98,8 +98,8 @@ def _other_image_size(v: _Values) -> str:
     if "speed_mps" not in v:
         return _(
             "the {tracks} tracks fit an image of {width_px} x {height_px} pixels: people walk on "
-            "the ground there, at {rescaled_speed_mps:.2f} m/s, and above the horizon in pixels of "
-            "the camera's frame",
+            "the ground there, at {rescaled_speed_mps:.2f} m/s, but outside it in pixels of the "
+            "camera's frame",
             **v,
         )
     return _(

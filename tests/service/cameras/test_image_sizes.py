@@ -1,15 +1,18 @@
 """Tracks in the numbers of another image are asked about before a reference is learned."""
 
+import json
+
 import numpy as np
 import pytest
 from sqlalchemy import select
 
 from service.store.tracks import TrackRecord, unpack
-from tests.conftest import CAMERA
+from tests.conftest import CAMERA, SCENES
 from tests.service.conftest import problem
 from tests.service.street import LENS, PRIOR, Street
 
 URL = "/cameras/corner"
+FIELD = SCENES.parent / "field"
 WANTED = 40
 FRAME = (1280, 720)
 STREAMS = [
@@ -89,6 +92,19 @@ def test_tracks_of_another_image_are_held_until_they_are_rescaled(http, settings
     assert found["reference"]["walking_speed_mps"] == pytest.approx(1.3, abs=0.15)
     assert abs(found["drift"]["tilt_deg"] or 0.0) < 0.5
     assert street.alerts() == []
+
+
+@pytest.mark.skipif(not FIELD.is_dir(), reason="field inputs are not at hand")
+def test_question_is_asked_from_the_first_track_on(http, settings):
+    street = stream(http, settings, "shares")
+    body = json.loads((FIELD / "shares_unsaid.json").read_text())
+    assert http.post(f"{URL}/tracks", json=body).json()["accepted"] == 1
+    held = street.look()
+    assert (held["state"], held["reason_code"]) == ("learning", "image_shares")
+    assert held["reason_values"] == {"tracks": 1, "largest_px": 0.59}
+    street.change(held["questions"][0]["fixes"][0]).raise_for_status()
+    np.testing.assert_allclose(street.feet()["1"][0], [0.2 * 1280 - 0.5, 359.5])
+    assert street.look()["reason_code"] == "reference_tracks"
 
 
 def test_later_posts_are_rescaled_unless_they_state_their_size(http, settings):
@@ -232,6 +248,7 @@ def test_page_asks_and_offers_the_fixes(http, settings):
     assert "Yes, rescale from 320 x 180" in page
     assert 'data-change="{&#34;tracks_size&#34;: [1280, 720]}"' in page
     assert "No, keep 1280 x 720 pixels" in page
+    assert "a question about its tracks is open" in http.get("/").text
     street.change({"tracks_size": [320, 180]}).raise_for_status()
     assert "Are the tracks in pixels" not in http.get("/ui/cameras/corner").text
 

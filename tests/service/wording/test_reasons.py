@@ -113,7 +113,7 @@ SAID = [
     (T.OTHER_IMAGE_SIZE, {"tracks": 200, "width_px": 640, "height_px": 360,
                           "sizes_px": ["640x360"], "rescaled_speed_mps": 1.312},
      "the 200 tracks fit an image of 640 x 360 pixels: people walk on the ground there, at "
-     "1.31 m/s, and above the horizon in pixels of the camera's frame"),
+     "1.31 m/s, but outside it in pixels of the camera's frame"),
     (S.AS_SAID, {"text": "it has turned"}, "it has turned"),
     (S.LEARNING_REFERENCE, {}, "the reference is being learned"),
     (S.NOBODY_POSTED, {}, "no track of anybody has been posted for it yet"),
