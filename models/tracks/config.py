@@ -85,4 +85,4 @@ SIZE_UNKNOWN_PACE = 0.6  # spread of a log where too few walk on the ground
 SIZE_OUTSIDE = 30.0  # if all feet are outside the frame or above the horizon
 SIZE_OTHER_SHAPE = 7.0  # streams keep their shape more often than not
 SIZE_MOST_STATURE = 4.0  # that boxes count against a size; for one never: hidden feet halve them
-SIZE_LEAST_GAIN = 4.2  # people in the corner of a recording reach 3.8
+SIZE_LEAST_GAIN = 7.5  # people in a corner of a recording reach 7.2 at one camera, else 3.8

@@ -18,7 +18,7 @@ FRAME = (1280, 720)
 STREAMS = [
     pytest.param("shares", "image_shares", {"tracks_normalised": True}, id="shares"),
     pytest.param((320, 180), "other_image_size", {"tracks_size": [320, 180]}, id="320x180"),
-    pytest.param((640, 360), "other_image_size", {"tracks_size": [640, 360]}, id="640x360"),
+    pytest.param((427, 240), "other_image_size", {"tracks_size": [427, 240]}, id="427x240"),
     pytest.param((2560, 1440), "other_image_size", {"tracks_size": [2560, 1440]}, id="2560x1440"),
 ]
 
