@@ -39,3 +39,5 @@ class TracksCode(StrEnum):
     PRIOR_POSE_DOUBTED = "prior_pose_doubted"
     PIECES = "pieces"
     SITE_CHANGED = "site_changed"
+    IMAGE_SHARES = "image_shares"
+    OTHER_IMAGE_SIZE = "other_image_size"

@@ -79,6 +79,8 @@ PUBLIC_MODELS = {
     "models.regression.training": "a training",
     "models.simulation.poses": "a knock; the demo's camera, as often as people pass it",
     "models.simulation.walkers": "the demo's people; how fast a site's walk",
+    "models.tracks.image_size": "the image size that the numbers of tracks belong to",
+    "models.tracks.scaling": "from the numbers of another image to the pixels of a frame",
     "models.tracks.scenes": "recorded scenes, to replay",
     "models.tracks.trajectory": "the track, and how long one must be",
     "models.walking.config": "how few people tell something",

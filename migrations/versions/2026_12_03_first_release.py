@@ -114,6 +114,7 @@ table(
     *needed(DateTime, "created_at", "updated_at"),
     *optional(String, "snapshot_credentials"),
     *needed(Boolean, "snapshot_digest"),
+    *optional(JSON, "image_sizes"),
 )
 table(
     "prior_poses",
@@ -199,6 +200,7 @@ table(
     *needed(LargeBinary, "points"),
     *optional(LargeBinary, "boxes", "heads"),
     *needed(DateTime, "received_at"),
+    *optional(NUMBER, "first_px"),
     sa.UniqueConstraint("camera_id", "source", "track_id", "started_s"),
     Index(None, "camera_id", "ended_s", "source"),
     Index(None, "camera_id", "id"),

@@ -51,3 +51,38 @@ CLEAR = 4.0  # twice the log odds against the next best of either piece, for a l
 STRANGERS = 10.0  # odds against any two that happen to follow: doors bring people together
 STRANGERS_S = 5.0  # at the usual pace: two are at least as far apart by chance
 MANY_PIECES = 0.1  # of the tracks: so many are worth a word
+
+# Shares of the image that were posted as pixels
+SHARES_FEWEST = 1  # tracks: nobody walks within a pixel
+SHARES_PX = (-1.25, 1.5)  # MOT text counts pixels from 1, and feet may lie below the image
+
+# Another image size than the frame's (`image_size`): chosen on 17 recordings, scaled and cropped
+USUAL_SIZES = (
+    *((320, 180), (320, 240), (352, 240), (352, 288), (416, 234), (416, 416), (480, 270)),
+    *((512, 288), (512, 512), (608, 608), (640, 360), (640, 480), (640, 640), (704, 480)),
+    *((704, 576), (720, 480), (720, 576), (768, 432), (800, 450), (800, 600), (848, 480)),
+    *((960, 540), (1024, 576), (1024, 768), (1280, 720), (1280, 960), (1600, 900)),
+    *((1920, 1080), (2048, 1536), (2304, 1296), (2560, 1440), (2592, 1944), (2688, 1520)),
+    *((3072, 1728), (3840, 2160)),
+)  # streams of network cameras and inputs of detectors, in px
+SIZE_PARTS = (4, 3, 2, 1 / 2)  # of the frame's own size, beside them: half of 2688 is in no list
+SIZE_FEWEST, SIZE_FEWEST_SPEEDS = 30, 4  # tracks, and those that walk on the ground
+SIZE_MARGIN, SIZE_WITHIN = 0.01, (0.995, 0.9)  # of an edge; the share of u and of v within it
+SIZE_LOWEST = 1.5  # times the height: feet below the image, where boxes are completed
+SIZE_REACH_QUANTILE = 0.99  # of u and v, which reach so far to the right and down:
+SIZE_REACHED, SIZE_FILLED = 0.85, 0.4  # of the width or the height, and of the other
+SIZE_CLOSENESS, SIZE_MOST_NAMED = 12.0, 4  # log odds by the log of that share; sizes of a reason
+SIZE_SAME_SHAPE = 0.03  # relative difference of two aspect ratios
+# Log odds: terms of one size, and what another one has to be better by
+SIZE_STRIDE_S, SIZE_PAUSE = 1.4, 0.3  # of a speed; slower than that share of a track's own: paused
+SIZE_SPEED_MPS, SIZE_SPEED_SD = 1.25, 0.25  # of a site's median; sd of its log
+SIZE_SPEEDS_MPS = (0.6, 2.1)  # medians of recorded sites are 0.66 to 1.5
+SIZE_STATURE_M, SIZE_STATURE_SD = 1.8, 0.1  # of boxes, which are a little loose
+SIZE_MOST_LEVEL = 12.5  # five standard deviations: a wrong height is not worth more
+SIZE_MOST_TRACKS = 60  # people of one hour are alike: more tracks say the same again
+SIZE_PACE_WEIGHT, SIZE_SPREAD_WEIGHT, SIZE_STATURES = 1 / 6, 1 / 12, 5.0  # a track; all boxes
+SIZE_UNKNOWN_PACE = 0.6  # spread of a log where too few walk on the ground
+SIZE_OUTSIDE = 30.0  # if all feet are outside the frame or above the horizon
+SIZE_OTHER_SHAPE = 7.0  # streams keep their shape more often than not
+SIZE_MOST_STATURE = 4.0  # that boxes count against a size; for one never: hidden feet halve them
+SIZE_LEAST_GAIN = 7.5  # people in a corner of a recording reach 7.2 at one camera, else 3.8

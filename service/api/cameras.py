@@ -31,6 +31,7 @@ from service.api.schemas import (
     Out,
     PoseOut,
     PriorPoseBody,
+    QuestionOut,
     ReferenceOut,
     Text,
     Who,
@@ -39,6 +40,7 @@ from service.cameras import cameras
 from service.cameras.cameras import CameraChange, CameraSpec, CameraView
 from service.degrees import in_degrees
 from service.enums import PoseState
+from service.formats.scaling import ImageSize
 from service.notifications.fetch import Credentials
 from service.notifications.send import read_url
 from service.wording.typed_pose import judge_typed
@@ -53,6 +55,9 @@ FrameRate = Annotated[Finite, Field(gt=0, le=1000)]
 SnapshotUrl = Annotated[str, AfterValidator(_checked_url)]
 _MOST_CREDENTIALS = 200
 ReferenceTracks = Annotated[int, Field(ge=5, le=100_000)]
+TracksSize = Annotated[
+    list[Annotated[Finite, Field(gt=0, le=100_000)]], Field(min_length=2, max_length=2)
+]
 
 
 class CredentialsBody(Body):
@@ -178,17 +183,35 @@ class CameraPatch(_LensedBody):
     snapshot_credentials: CredentialsBody | Literal[""] | None = Field(
         None, description="empty: none"
     )
+    tracks_size: TracksSize | None = Field(
+        None,
+        description="[width, height] in pixels of the image that the numbers of the active "
+        "source's tracks belong to, if its posts do not state a `size`; the frame's own size "
+        "confirms pixels of the frame. Rescales stored tracks, and applies to later posts",
+    )
+    tracks_normalised: bool | None = Field(
+        None,
+        description="true: those numbers are shares of the image, 0 to 1; false: pixels of the "
+        "frame, unless `tracks_size` is given",
+    )
+
+    @model_validator(mode="after")
+    def _one_image_size(self) -> Self:
+        if self.tracks_size is not None and self.tracks_normalised:
+            raise ValueError("either tracks_size or tracks_normalised is accepted, got both")
+        return self
+
+    def image_size(self) -> ImageSize | None:
+        """The declared image size of tracks; None if it does not change."""
+        if self.tracks_size is not None:
+            return ImageSize(size=(self.tracks_size[0], self.tracks_size[1]))
+        if self.tracks_normalised is None:
+            return None
+        return ImageSize(normalised=self.tracks_normalised)
 
 
 def _credentials(body: CredentialsBody | None) -> Credentials | None:
     return None if body is None else body.to_value()
-
-
-class QuestionOut(Out):
-    """What may be a slip, refuses nothing, and was stored as it came; `field` is the suspect."""
-
-    field: str | None
-    text: str
 
 
 class MeasuredOut(BaseModel):
@@ -219,6 +242,10 @@ class CameraOut(Out):
     snapshot_url: str | None
     snapshot_credentials_set: bool
     snapshot_error: str | None
+    tracks_size: list[float] | None = Field(
+        description="declared image size of the active source's tracks; null: not declared"
+    )
+    tracks_normalised: bool
     state: PoseState
     reference: ReferenceOut
     tracks: int
@@ -229,7 +256,7 @@ class CameraOut(Out):
     @classmethod
     def from_value(cls, view: CameraView, caller: Caller | None) -> Self:
         """The body of a camera for a caller."""
-        record = view.record
+        record, size = view.record, view.image_size
         return cls.of(
             record,
             snapshot_url=address_for(caller, record.snapshot_url),
@@ -240,6 +267,8 @@ class CameraOut(Out):
             walking_speed=WalkingSpeedBody(
                 mean_mps=record.walking_speed_mean_mps, sd_mps=record.walking_speed_sd_mps
             ),
+            tracks_size=None if size is None or size.size is None else list(size.size),
+            tracks_normalised=size is not None and size.normalised,
             state=view.state,
             reference=ReferenceOut.of(view.reference),
             tracks=view.tracks,
@@ -256,7 +285,10 @@ class CameraAnswer(CameraOut):
     def from_value(cls, view: CameraView, caller: Caller | None) -> Self:
         """The body of a camera, with the questions that the registration form asks about it."""
         # Of a pose that is assumed, what was measured may be a slip, too.
-        asked = [QuestionOut.of(each) for each in judge_typed(view.intrinsics, view.prior_pose)]
+        asked = [
+            QuestionOut(field=each.field, text=each.text)
+            for each in judge_typed(view.intrinsics, view.prior_pose)
+        ]
         return cls(**dict(CameraOut.from_value(view, caller)), questions=asked)
 
 
@@ -331,6 +363,9 @@ def change(
 ) -> CameraAnswer:
     """Change a camera; another lens, prior pose or walking speed queues a training.
 
+    So does `tracks_size` or `tracks_normalised` if it rescales stored tracks. It answers the
+    question about them in `GET /cameras/{id}/pose`.
+
     `If-Match` is the ETag of the camera as it was read; without it the answer, 428, has it in
     `etag`, and so has that of a change made of an older version, 412.
     """
@@ -358,6 +393,7 @@ def change(
             reference_tracks=body.reference_tracks,
             snapshot_url=body.snapshot_url,
             snapshot_credentials="" if given == "" else _credentials(given),
+            image_size=body.image_size(),
         ),
         body.by,
     )

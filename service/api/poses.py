@@ -25,6 +25,7 @@ from service.api.schemas import (
     Moment,
     Out,
     PoseOut,
+    QuestionOut,
     ReasonCode,
     ReasonValues,
     ReferenceOut,
@@ -47,6 +48,7 @@ from service.reasons import code_of, values_of
 from service.settings import Settings
 from service.store.access import name_in
 from service.store.estimates import EstimateRecord, identifiable_drift, identifiable_sd
+from service.wording.image_sizes import question_words
 from service.wording.times import from_seconds
 
 
@@ -159,6 +161,9 @@ class ServedPoseOut(BaseModel):
     reason: str
     reason_code: ReasonCode | None
     reason_values: ReasonValues
+    questions: list[QuestionOut] = Field(
+        description="about the input; nothing is learned from tracks in question until an answer"
+    )
 
     @classmethod
     def from_value(cls, view: PoseView) -> Self:
@@ -191,6 +196,7 @@ class ServedPoseOut(BaseModel):
             reason=view.reason,
             reason_code=code_of(view.reasons),
             reason_values=values_of(view.reasons),
+            questions=_questions(view),
         )
 
 
@@ -226,6 +232,20 @@ class History(BaseModel):
     """Estimates, oldest first."""
 
     items: list[HistoryPoint]
+
+
+def _questions(view: PoseView) -> list[QuestionOut]:
+    asked = view.question
+    if asked is None:
+        return []
+    return [
+        QuestionOut(
+            field=next(iter(asked.fixes[0])),
+            text=question_words(asked.reason),
+            fixes=list(asked.fixes),
+            keep=asked.keep,
+        )
+    ]
 
 
 def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float | None]:

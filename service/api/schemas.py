@@ -351,6 +351,19 @@ class RivalOut(BaseModel):
     weight: float
 
 
+class QuestionOut(Out):
+    """A question about the input of a camera: what may be a mistake, and how to fix it.
+
+    `field` is the suspect. Each of `fixes` is a body of `PATCH /cameras/{id}` that fixes it, the
+    most likely first; `keep` is the body that confirms the input as it is.
+    """
+
+    field: str | None
+    text: str
+    fixes: list[dict[str, Any]] = []
+    keep: dict[str, Any] | None = None
+
+
 class SinceOut(BaseModel):
     """The times between which a camera moved: it stood at `after` and had moved by `before`."""
 

@@ -21,7 +21,8 @@ class UseBody(Body):
 class SourceOut(Out):
     """A source of tracks; `usable_tracks` of `wanted_tracks` would make a reference of it.
 
-    `token_id` is of the token whose name it is; null where access was off.
+    `token_id` is of the token whose name it is; null where access was off. `size` or `normalised`
+    are declared for its posts that state no image size (`PATCH /cameras/{id}`).
     """
 
     name: str
@@ -32,6 +33,8 @@ class SourceOut(Out):
     first_seen_at: datetime
     last_seen_at: datetime
     token_id: str | None
+    size: list[float] | None = None
+    normalised: bool = False
 
 
 class SourceList(BaseModel):
@@ -49,7 +52,12 @@ def list_all(camera_id: str, state: StateDep, session: ReadDep) -> SourceList:
     found = sources.list_sources(session, state.settings, camera_id)
     items = [
         SourceOut.of(
-            each.record, counts=each.counts, usable_tracks=each.usable, wanted_tracks=each.wanted
+            each.record,
+            counts=each.counts,
+            usable_tracks=each.usable,
+            wanted_tracks=each.wanted,
+            size=None if each.image_size is None else each.image_size.stored,
+            normalised=each.image_size is not None and each.image_size.normalised,
         )
         for each in found
     ]

@@ -1,5 +1,6 @@
 """`POST /cameras/{id}/tracks` in all its forms."""
 
+import json
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import nullcontext
@@ -25,7 +26,7 @@ from service.cameras import tracks
 from service.errors import MalformedError, ServiceError, UnsupportedMediaTypeError
 from service.formats import batch as formats
 from service.formats.batch import DEFAULT_SOURCE
-from service.formats.scaling import read_size
+from service.formats.scaling import image_sizes_of, read_size
 from service.formats.track import Batch, Clock, Limits
 from service.formats.track_text import people_classes, read_text
 from service.store.cameras import Picture
@@ -197,6 +198,7 @@ def read_batch(state: AppState, camera: Picture, came: Posted) -> Batch:
         max_ahead_s=state.settings.max_ahead_s,
         fisheye=camera.fisheye,
         classes=classes or PEDESTRIANS,
+        image_sizes=image_sizes_of(json.loads(camera.image_sizes or "null")),
     )
     try:
         size = None if came.size is None else read_size(came.size)

@@ -17,6 +17,7 @@ from models.geometry.usual_pose import usual_pose
 from service.access.activity import note
 from service.alerts.alerts import close_pose_alerts, end_alert, list_alerts
 from service.cameras.held_poses import held_pose, keep_drawn
+from service.cameras.image_sizes import declare_size, declared_size, forget_frame_size
 from service.cameras.image_source import set_image_source
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
@@ -28,6 +29,7 @@ from service.errors import (
     check_version,
 )
 from service.estimate_queue import request_estimate
+from service.formats.scaling import ImageSize
 from service.job_queue import JobQueue
 from service.notifications.events import tell_of_camera
 from service.notifications.fetch import Credentials
@@ -83,11 +85,12 @@ class CameraChange:
     reference_tracks: int | None = None
     snapshot_url: str | None = None
     snapshot_credentials: Credentials | Literal[""] | None = None
+    image_size: ImageSize | None = None
 
 
 _SEPARATE = (  # changes that are no columns, or have more to them
     *("intrinsics", "prior_pose", "given", "homography"),
-    *("snapshot_url", "snapshot_credentials"),
+    *("snapshot_url", "snapshot_credentials", "image_size"),
 )
 
 
@@ -95,7 +98,8 @@ _SEPARATE = (  # changes that are no columns, or have more to them
 class CameraView:
     """A camera as clients see it; `calibrated` once its prior pose was given or confirmed.
 
-    `measured` is what is known of a pose before that, in metres and radians.
+    `measured` is what is known of a pose before that, in metres and radians. `image_size` is
+    declared for the active source of its tracks.
     """
 
     record: CameraRecord
@@ -106,6 +110,7 @@ class CameraView:
     model_id: str | None
     state: PoseState
     reference: ReferenceView
+    image_size: ImageSize | None
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -226,8 +231,11 @@ def change_camera(
 ) -> CameraView:
     """Change a camera; another lens or prior pose queues a training.
 
+    Another image size of its tracks rescales those that are stored; its reference is learned anew.
+
     Raises:
         NotFoundError: there is none of that id.
+        ConflictError: an image size, and the camera has no tracks yet.
         PreconditionFailedError: it was changed since the client read it.
         PreconditionRequiredError: the client does not say what it has read.
         ConflictError: measurements are given of a camera that has a prior pose.
@@ -265,11 +273,18 @@ def change_camera(
         request_estimate(session, queue, camera_id)
     geometry_changed = change.intrinsics is not None or change.prior_pose is not None
     speed_changed = "walking_speed_mean_mps" in changed or "walking_speed_sd_mps" in changed
-    if geometry_changed or speed_changed or change.given is not None:
+    if (record.width, record.height) != size:
+        forget_frame_size(record, size)
+    rescaled = False
+    if change.image_size is not None:
+        rescaled = declare_size(session, record, change.image_size, by)
+        request_estimate(session, queue, camera_id)
+    if geometry_changed or speed_changed or rescaled or change.given is not None:
         # A model is for one lens at one prior pose: the new record makes the old one too old.
         if change.prior_pose is not None:
             close_pose_alerts(session, camera_id, Outcome.ACCEPTED, name_in(session, by))
-        # Tracks seen so far may be of another pose or lens, but not of other people.
+        # Tracks seen so far may be of another pose or lens, but not of other people; those that
+        # were rescaled are of the same pose.
         from_s = reference.from_s
         if geometry_changed:
             from_s = tracks.newest_end_s(session, camera_id)
@@ -420,6 +435,7 @@ def _views(
             model_id=model_id,
             state=statuses[record.id].state,
             reference=views[record.id],
+            image_size=declared_size(record, statuses[record.id].reference.source),
         )
         for record, prior, model_id in cameras.all_as_set_up(session, statuses.keys())
     ]

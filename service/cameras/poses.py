@@ -12,6 +12,7 @@ from models.reasons import Reason, Value
 from models.walking.config import FEWEST_WALKERS
 from service.alerts.data_gaps import data_gap_of
 from service.cameras.cameras import no_camera, require_camera
+from service.cameras.image_sizes import ImageQuestion, question_of
 from service.cameras.proposals import Proposal, proposal_of
 from service.cameras.reference_views import ReferenceView, reference_views
 from service.cameras.status import CameraStatus, camera_statuses
@@ -31,7 +32,8 @@ class PoseView:
     """The served pose of a camera, and its status.
 
     `calibrated` once somebody has said or agreed to a prior pose; until then `proposed` is what
-    people told of it, and None where there were too few.
+    people told of it, and None where there were too few. `question` is open about the image size
+    of its tracks, until which nothing is learned from them.
     """
 
     status: CameraStatus
@@ -42,6 +44,7 @@ class PoseView:
     reference: ReferenceView
     model_id: str | None
     checked_at: datetime | None
+    question: ImageQuestion | None
     etag: str
 
     @property
@@ -61,9 +64,13 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         raise no_camera(camera_id)
     camera, prior, model_id = set_up
     status = camera_statuses(session, settings, (camera_id,))[camera_id]
+    if status.in_question:
+        status = replace(status, estimate=None)  # it is from the tracks in question
     reference = reference_views(session, settings, {camera_id: status})[camera_id]
     pose, calibrated = prior.pose, not prior.assumed
-    proposed = None if calibrated else proposal_of(session, prior, camera.intrinsics)
+    proposed = (
+        None if calibrated or status.in_question else proposal_of(session, prior, camera.intrinsics)
+    )
     reasons = _reasons_of(session, settings, status, reference, proposed)
     if proposed is not None:
         pose = proposed.pose
@@ -85,6 +92,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         reference=reference,
         model_id=model_id,
         checked_at=checked,
+        question=question_of(reasons, camera),
         etag=f'"{hashlib.sha256(repr(served).encode()).hexdigest()[:24]}"',
     )
 
@@ -133,6 +141,8 @@ def _reasons_of(
             found += [Reason(code=ServiceCode.LAST_IDENTIFIABLE), *estimate.reasons]
         else:
             found += _of_alerts(status)
+    if status.in_question:
+        found += status.reference.doubts
     if status.state == PoseState.UNCALIBRATED:
         found.append(_why_uncalibrated(status, learned, proposed))
     elif not status.judged:

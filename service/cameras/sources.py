@@ -18,9 +18,11 @@ from service.access.claims import may_claim, require_own
 from service.access.tokens import Caller
 from service.alerts.alerts import end_alert, open_alert
 from service.cameras.cameras import require_camera
+from service.cameras.image_sizes import declared_size, forget_sizes
 from service.enums import Activity, AlertKind, AlertSource, Origin, Outcome, PoseState, Severity
 from service.errors import ConflictError, NotFoundError, TooManySourcesError
 from service.estimate_queue import request_estimate
+from service.formats.scaling import ImageSize
 from service.job_queue import JobQueue
 from service.reasons import ServiceCode
 from service.references import (
@@ -43,12 +45,16 @@ from service.wording.alerts import ONE_SOURCE_POSTS, source_change
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceView:
-    """A source as clients see it. `usable` of `wanted` tracks would make a reference of it."""
+    """A source as clients see it. `usable` of `wanted` tracks would make a reference of it.
+
+    `image_size` is declared for its posts that state none.
+    """
 
     record: SourceRecord
     counts: bool
     usable: int
     wanted: int
+    image_size: ImageSize | None = None
 
 
 def note_source(
@@ -103,6 +109,7 @@ def list_sources(session: Session, settings: Settings, camera_id: str) -> list[S
             counts=record.name == reference.source,
             usable=_usable(session, settings, reference, record.name),
             wanted=min(camera.reference_tracks, settings.keep_tracks),
+            image_size=declared_size(camera, record.name),
         )
         for record in sources.of_camera(session, camera_id)
     ]
@@ -153,6 +160,7 @@ def remove_source(session: Session, camera_id: str, name: str, by: str | None) -
     if references.newest(session, camera_id).source == name:
         raise ConflictError(f"source: {name!r} counts; say first which one is to count instead")
     sources.forget(session, record)
+    forget_sizes(require_camera(session, camera_id), [name])
     note(session, Activity.SOURCE_REMOVED, by=by, camera_id=camera_id, text=name)
 
 

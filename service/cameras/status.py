@@ -54,6 +54,11 @@ class CameraStatus:
         return None if self.estimate is None else self.estimate.drift
 
     @property
+    def in_question(self) -> bool:
+        """True if a question is open about the tracks that its reference is learned from."""
+        return self.reference.ready_at is None and bool(self.reference.doubts)
+
+    @property
     def identifiable(self) -> tuple[str, ...]:
         """Those of tilt, roll, height, heading that are estimated."""
         return () if self.estimate is None else tuple(self.estimate.identifiable)

@@ -215,6 +215,7 @@ def receive_tracks(
                 "boxes": None if track.boxes is None else pack(track.boxes),
                 "heads": None if track.heads is None else pack(track.heads),
                 "received_at": now,
+                "first_px": track.first_px,
             }
             for track in batch.tracks
         ],

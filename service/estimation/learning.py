@@ -1,5 +1,6 @@
 """Learn a camera's reference once its tracks are there: a job's work, seconds of a core."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -19,11 +20,14 @@ from service.alerts.alerts import open_alert
 from service.enums import Activity, AlertKind, AlertSource, Severity
 from service.estimation.anchoring import keep_paths, paths_of
 from service.estimation.evidence import Unpacked, until_so_many, walk_of
+from service.notifications.events import tell_of_camera
 from service.reasons import some
 from service.references import attendance_of, wanted_tracks
 from service.settings import Settings
 from service.store import cameras, references, windows
 from service.store.cameras import CameraRecord
+from service.store.references import SiteReferenceRecord
+from service.store.tracks import StoredTrack
 
 # What does not fit the prior pose: speeds or statures out of all proportion, or the pose itself.
 _DOUBT_KINDS: dict[StrEnum, AlertKind] = {
@@ -38,7 +42,7 @@ class ReferencePeriod:
     """The tracks of a reference, in the order of their ends, and what else it is learned of.
 
     There may not be `enough` yet. `pieces` of them go on others' walks; they ended in so many
-    different `hours` of date and time (UTC).
+    different `hours` of date and time (UTC). The image size of the `unstated` ones is not known.
     """
 
     reference_id: int
@@ -49,6 +53,7 @@ class ReferencePeriod:
     prior: CameraPose
     walk: WalkConfig
     trajectories: tuple[Trajectory, ...]
+    unstated: tuple[Trajectory, ...]
 
     @property
     def to_s(self) -> float:
@@ -94,6 +99,20 @@ def load_reference_period(
         prior=prior,
         walk=walk_of(camera),
         trajectories=tuple(unpacked.seen(record, intrinsics) for record in records),
+        unstated=unstated_tracks(camera, reference.source, records, unpacked),
+    )
+
+
+def unstated_tracks(
+    camera: CameraRecord, source: str | None, records: Sequence[StoredTrack], unpacked: Unpacked
+) -> tuple[Trajectory, ...]:
+    """Tracks of a source whose image size is neither stated nor declared."""
+    if source is None or source in (camera.image_sizes or {}):
+        return ()
+    return tuple(
+        unpacked.seen(record, camera.intrinsics)
+        for record in records
+        if record.first_px is not None
     )
 
 
@@ -106,11 +125,25 @@ def compute_reference(period: ReferencePeriod, seed: int) -> CameraSite | None:
         return None
 
 
-def save_progress(session: Session, camera_id: str, period: ReferencePeriod) -> None:
-    """Keep how much of a reference there is, for those who wait for it."""
+def save_progress(
+    session: Session, camera_id: str, period: ReferencePeriod, doubt: Reason | None
+) -> None:
+    """Store the progress of a reference, and a doubt about the image size of its tracks."""
     record = references.newest_if_any(session, camera_id)
-    if record is not None and record.id == period.reference_id and record.ready_at is None:
-        record.pieces, record.hours = period.pieces, period.hours
+    if record is None or record.id != period.reference_id or record.ready_at is not None:
+        return
+    record.pieces, record.hours = period.pieces, period.hours
+    save_doubt(session, record, doubt)
+
+
+def save_doubt(session: Session, record: SiteReferenceRecord, doubt: Reason | None) -> None:
+    """Store a doubt about the image size of the tracks of a reference, or that there is none."""
+    camera = session.get(CameraRecord, record.camera_id)
+    if camera is None or record.source in (camera.image_sizes or {}):
+        doubt = None  # it was declared while this was computed
+    if record.doubts != some(doubt):
+        record.doubts = some(doubt)
+        tell_of_camera(session, record.camera_id)
 
 
 def save_reference(
@@ -127,7 +160,7 @@ def save_reference(
     record = references.newest_if_any(session, camera_id)
     if record is None or record.id != period.reference_id or record.ready_at is not None:
         return
-    record.pieces, record.hours = period.pieces, period.hours
+    record.pieces, record.hours, record.doubts = period.pieces, period.hours, ()
     if learned is None:
         record.wanted += max(record.wanted, 1)
         return

@@ -8,10 +8,12 @@ from sqlalchemy.orm import Session
 from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.pose import SelfCalibration, self_calibrate
+from models.reasons import Reason
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from service.enums import PoseState
 from service.estimation.evidence import Unpacked, walk_of
+from service.estimation.learning import save_doubt, unstated_tracks
 from service.notifications.events import tell_of_camera
 from service.references import window_of
 from service.settings import Settings
@@ -21,13 +23,18 @@ from service.store.cameras import CameraRecord, ProposedPoseRecord
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class People:
-    """The newest people before a camera, by their ends, and what was measured of its pose."""
+    """The newest people before a camera, by their ends, and what was measured of its pose.
+
+    The image size of the `unstated` ones is not known, and may be `doubted` already.
+    """
 
     prior_pose_id: int
     intrinsics: Intrinsics
     walk: WalkConfig
     measured: dict[str, float]
     tracks: tuple[Trajectory, ...]
+    unstated: tuple[Trajectory, ...]
+    doubted: bool
 
 
 def load_people(
@@ -50,6 +57,8 @@ def load_people(
         walk=walk_of(camera),
         measured=prior.measured,
         tracks=tuple(unpacked.seen(record, intrinsics) for record in records),
+        unstated=unstated_tracks(camera, reference.source, records, unpacked),
+        doubted=bool(reference.doubts),
     )
 
 
@@ -61,9 +70,21 @@ def compute_proposal(people: People) -> SelfCalibration | None:
         return None
 
 
-def save_proposal(session: Session, camera_id: str, people: People, found: SelfCalibration) -> None:
-    """Keep a pose for somebody to agree to, unless somebody has said one meanwhile."""
+def save_proposal(
+    session: Session,
+    camera_id: str,
+    people: People,
+    found: SelfCalibration | None,
+    doubt: Reason | None,
+) -> None:
+    """Store a proposed pose, and a doubt about the image size of the tracks, if there is one.
+
+    Nothing is stored if the camera got another prior pose in the meantime.
+    """
     if cameras.prior_pose(session, camera_id).id != people.prior_pose_id:
+        return
+    save_doubt(session, references.newest(session, camera_id), doubt)
+    if found is None:
         return
     record = ProposedPoseRecord(
         prior_pose_id=people.prior_pose_id,

@@ -92,6 +92,7 @@ def read_json(body: bytes, clock: Clock, limits: Limits) -> Batch:
         limits = limits.of_size(document.get("size"), document.get("normalised"))
     except ValueError as error:
         raise MalformedError.of_field(*str(error).split(": ", 1)) from error
+    limits = limits.of_source(source)
     try:
         return collect(
             source,
@@ -114,6 +115,7 @@ def read_ndjson(body: bytes, source: str, clock: Clock, limits: Limits) -> Batch
     ends = body.count(b"\n")
     if ends > _MOST_ENDS:
         raise TooLargeError(f"lines: at most {_MOST_ENDS} ends of one are taken, got {ends}")
+    limits = limits.of_source(source)
     lines = [line for line in body.split(b"\n") if line.strip()]
     check_count(len(lines))
 

@@ -1,45 +1,52 @@
-"""The picture that a post's numbers are of: mostly a detector's smaller stream, or shares of it."""
+"""The image that the numbers of a post belong to: often a detector's smaller stream, or shares."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from models.geometry.rotation import Array
+from models.tracks.scaling import SAME, Scaling, scaling_of_shares, scaling_of_size
 
 _LARGEST_PX = 100_000
 FIELDS = ("size", "normalised")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scaling:
-    """Pixels of the camera's own picture, `factor * number + shift`, for u and for v.
+class ImageSize:
+    """The image that a source's numbers belong to if its posts do not state one.
 
-    Both count from the centre of their first pixel; shares of the picture count from its edge.
+    `size` is (width, height) in pixels. Without it the numbers are shares of the image
+    (`normalised`), or pixels of the camera's frame.
     """
 
-    factor: tuple[float, float]
-    shift: tuple[float, float]
+    size: tuple[float, float] | None = None
     normalised: bool = False
 
-    def applied(self, rows: Array) -> Array:
-        """Rows (N, 3) or (N, 5) of time, u, v, u, v with their numbers in the camera's pixels."""
-        scaled = rows.copy()
-        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by name
-            for column in range(1, rows.shape[1]):
-                at = (column - 1) % 2
-                scaled[:, column] = rows[:, column] * self.factor[at] + self.shift[at]
-        return scaled
+    def scaling(self, frame: tuple[int, int]) -> Scaling:
+        """The map of its numbers to the pixels of a frame (width, height)."""
+        return read_scaling(self.size, self.normalised, frame) or SAME
+
+    @property
+    def stored(self) -> list[float] | None:
+        """The size as a camera's column has it; None for shares."""
+        return None if self.size is None else list(self.size)
+
+
+def image_sizes_of(stored: Mapping[str, Any] | None) -> dict[str, ImageSize]:
+    """The declared image sizes by source, from a camera's column."""
+    return {
+        source: ImageSize(normalised=True) if size is None else ImageSize(size=(size[0], size[1]))
+        for source, size in (stored or {}).items()
+    }
 
 
 def read_scaling(size: Any, normalised: Any, picture: tuple[int, int]) -> Scaling | None:
-    """How numbers come into a camera's picture (width, height); None where they are of it.
+    """Return the map of numbers to a camera's frame (width, height); None if they are its pixels.
 
-    They are of a picture of `size` [width, height], or shares of one, 0 to 1, where `normalised`:
-    `size` then says nothing.
+    The numbers are pixels of an image of `size` [width, height], or shares of one, 0 to 1, if
+    `normalised` is true; `size` is then ignored.
 
     Raises:
-        ValueError: with the field, what is needed and what came.
+        ValueError: with the field, the allowed values and the value received.
     """
     if normalised is not None and not isinstance(normalised, bool):
         raise ValueError(f"normalised: true or false is needed, got {normalised!r:.40}")
@@ -47,12 +54,10 @@ def read_scaling(size: Any, normalised: Any, picture: tuple[int, int]) -> Scalin
         needed = f"[width, height] above 0 and at most {_LARGEST_PX} px is needed"
         raise ValueError(f"size: {needed}, got {size!r:.60}")
     if normalised:
-        factor = (float(picture[0]), float(picture[1]))
-        return Scaling(factor=factor, shift=(-0.5, -0.5), normalised=True)
+        return scaling_of_shares(picture)
     if size is None or tuple(size) == picture:
         return None
-    u, v = picture[0] / size[0], picture[1] / size[1]
-    return Scaling(factor=(u, v), shift=((u - 1) / 2, (v - 1) / 2))
+    return scaling_of_size((size[0], size[1]), picture)
 
 
 def read_size(text: str) -> list[float]:

@@ -1,5 +1,6 @@
 """One incoming track: its value, its limits, and why it may be refused."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -7,7 +8,8 @@ import numpy as np
 
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
-from service.formats.scaling import Scaling, read_scaling
+from models.tracks.scaling import Scaling
+from service.formats.scaling import ImageSize, read_scaling
 from surefoot.people import PEDESTRIANS, PersonClasses, SkipReason
 from surefoot.times import LAST_S, not_seconds
 from surefoot.track_rules import (
@@ -30,7 +32,8 @@ FOOT_COLUMNS = 3  # of a point: time, u and v; after them its head's, where it c
 class IncomingTrack:
     """A track as posted: points (N, 3) are time in s, u and v; boxes (N, 4) x1, y1, x2, y2.
 
-    Heads (N, 2) are u and v, where points carry them.
+    Heads (N, 2) are u and v, where points carry them. `first_px` is the number of the first pixel
+    in the post; None if the post states the image size of its numbers.
     """
 
     source: str
@@ -38,6 +41,7 @@ class IncomingTrack:
     points: Array
     boxes: Array | None = None
     heads: Array | None = None
+    first_px: int | None = None
 
     @property
     def stored_bytes(self) -> int:
@@ -85,7 +89,8 @@ class Limits:
     """Limits of tracks: the picture, and the time by our clock; how their numbers come into it.
 
     A track of later than now owns the camera's window, which is of the newest tracks, until that
-    time comes: `max_ahead_s` is what clocks may differ by.
+    time comes: `max_ahead_s` is what clocks may differ by. `image_sizes` are declared for sources
+    whose posts do not state one (`stated`). `first_px` is the number of the first pixel.
     """
 
     width: int
@@ -93,6 +98,9 @@ class Limits:
     now_s: float
     max_ahead_s: float
     scaling: Scaling | None = None
+    stated: bool = False
+    first_px: int = 0
+    image_sizes: Mapping[str, ImageSize] = field(default_factory=dict)
     fisheye: Intrinsics | None = None  # the lens, where it has no picture of some pixels
     classes: PersonClasses = PEDESTRIANS
 
@@ -105,7 +113,14 @@ class Limits:
         if size is None and normalised is None:
             return self
         scaling = read_scaling(size, normalised, (self.width, self.height))
-        return replace(self, scaling=scaling)
+        return replace(self, scaling=scaling, stated=True)
+
+    def of_source(self, source: str) -> "Limits":
+        """The limits of numbers by a source: of its declared image size, unless one is stated."""
+        declared = self.image_sizes.get(source)
+        if self.stated or declared is None:
+            return self
+        return replace(self, scaling=declared.scaling((self.width, self.height)))
 
     @property
     def normalised(self) -> bool:
@@ -113,8 +128,13 @@ class Limits:
         return self.scaling is not None and self.scaling.normalised
 
     def in_picture(self, rows: Array) -> Array:
-        """Rows of time, u, v, u, v as given, in pixels of the picture."""
-        return rows if self.scaling is None else self.scaling.applied(rows)
+        """Rows (N, 3) or (N, 5) of time, u, v, u, v as given, in pixels of the frame."""
+        if self.scaling is None:
+            return rows
+        scaled = rows.copy()
+        with np.errstate(over="ignore", invalid="ignore"):  # rejected by name later
+            scaled[:, 1:] = self.scaling.applied(rows[:, 1:])
+        return scaled
 
 
 class TrackSkippedError(Exception):
@@ -159,7 +179,13 @@ def check_track(track_id: str, source: str, rows: Array, limits: Limits) -> Inco
     _check_inside(points[:, 1:], (limits.width, limits.height))
     if limits.fisheye is not None:
         _check_seen(points[:, 1:], limits.fisheye)
-    return IncomingTrack(source=source, track_id=track_id, points=points, boxes=boxes)
+    return IncomingTrack(
+        source=source,
+        track_id=track_id,
+        points=points,
+        boxes=boxes,
+        first_px=None if limits.stated else limits.first_px,
+    )
 
 
 def track_name(value: Any) -> str:

@@ -42,6 +42,7 @@ def read_text(
         MalformedError: the layout, the classes or the clock are not known, or no line is readable.
         TooLargeError: too many lines or tracks.
     """
+    limits = limits.of_source(source)
     options = Options(
         frame_rate_hz=clock.frame_rate_hz,
         started_at_s=clock.started_at_s,
@@ -60,6 +61,7 @@ def read_text(
             raise malformed(error.reason) from error
         raise MalformedError.of_field(error.field, error.reason) from error
     check_count(len(found.rows))
+    limits = replace(limits, first_px=found.first_px)
 
     def read(track_id: str) -> IncomingTrack:
         if track_id in found.broken:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from models.tracks.scaling import Scaling
 from service.enums import ZoneOn
 from service.errors import MalformedError, TooLargeError, UnsupportedMediaTypeError
 from service.formats.nesting import check_levels
-from service.formats.scaling import Scaling, read_scaling
+from service.formats.scaling import read_scaling
 from service.formats.yaml_text import MAX_BYTES, read_yaml_text
 from service.formats.zones import Corner, Slot, Zone, refused, scaled, scaling_of, zones_of
 from service.formats.zones_axis import axis_slots, axis_template

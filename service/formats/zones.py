@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from models.tracks.scaling import Scaling
 from service.enums import ZoneOn
 from service.errors import FieldError, MalformedError
-from service.formats.scaling import Scaling, read_scaling
+from service.formats.scaling import read_scaling
 from service.formats.zone_extent import extent_fault
 
 MOST_ZONES, MOST_CORNERS = 100, 2_000  # of a camera; corners of all together

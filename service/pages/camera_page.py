@@ -40,7 +40,7 @@ from service.store.tracks import StoredTrack, trajectory_of
 from service.store.trainings import TrainingRecord
 from service.wording import alerts as alert_words
 from service.wording import camera as camera_words
-from service.wording import moves
+from service.wording import image_sizes, moves
 from service.wording.camera import CameraFacts
 from service.wording.language import _
 from service.wording.reasons import in_words
@@ -269,6 +269,9 @@ def show(
         plan=_plan(page.plan),
         words=alert_words,
         in_words=in_words,
+        question_words=image_sizes.question_words,
+        fix_words=image_sizes.fix_words,
+        keep_words=image_sizes.keep_words,
         states=camera_words.STATES,
         training_words=camera_words.TRAININGS,
         charts=draw_charts(history, clock),

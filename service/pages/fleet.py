@@ -104,6 +104,7 @@ class FleetRow:
             learned=self.learned,
             wanted=self.wanted,
             silent_s=now_s - (self.status.last_track_s or now_s),
+            asked=self.status.in_question,
         )
 
     @property

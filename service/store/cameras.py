@@ -57,7 +57,8 @@ class CameraRecord(Record):
     `snapshot_url` at `snapshot_due_at`, at once where that is None; `snapshot_error` is why the
     last one did not come. `site` is a path, None where nobody has said one.
     `snapshot_credentials` are sealed with the data directory's key. `snapshot_digest` is set once
-    the host of `snapshot_url` has asked for Digest.
+    the host of `snapshot_url` has asked for Digest. `image_sizes` has the declared size (width,
+    height) of the images that a source's numbers belong to, None for shares.
     """
 
     __tablename__ = "cameras"
@@ -95,6 +96,7 @@ class CameraRecord(Record):
     updated_at: Mapped[datetime]
     snapshot_credentials: Mapped[str | None]
     snapshot_digest: Mapped[bool] = mapped_column(default=False)
+    image_sizes: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -219,6 +221,7 @@ _AWAITED = Prepared(
         CameraRecord.height,
         CameraRecord.frame_rate_hz,
         type_coerce(CameraRecord.projection, String),
+        cast(CameraRecord.image_sizes, String),
     ).where(CameraRecord.id == bindparam("camera"))
 )
 
@@ -227,13 +230,15 @@ _AWAITED = Prepared(
 class Picture:
     """The pictures of a camera: their size, and how many a second, where that is known.
 
-    `fisheye` is the lens, where it has no picture of some pixels.
+    `fisheye` is the lens, where it has no picture of some pixels. `image_sizes` are declared for
+    sources, as JSON.
     """
 
     width: int
     height: int
     frame_rate_hz: float | None
     fisheye: Intrinsics | None
+    image_sizes: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,7 +259,13 @@ def awaited(connection: Connection, camera_id: str) -> Awaited | None:
     if row is None:
         return None
     fisheye = None if row[5] == Projection.PERSPECTIVE else _lens(connection, camera_id)
-    seen = Picture(width=row[2], height=row[3], frame_rate_hz=row[4], fisheye=fisheye)
+    seen = Picture(
+        width=row[2],
+        height=row[3],
+        frame_rate_hz=row[4],
+        fisheye=fisheye,
+        image_sizes=row[6],
+    )
     return Awaited(look=bool(row[0]), source=bool(row[1]), picture=seen)
 
 

@@ -33,6 +33,7 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.rotation import Array
 from models.geometry.upright import tops_of_boxes, uncut
+from models.tracks.scaling import Scaling
 from models.tracks.trajectory import Trajectory
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import new_rows
@@ -43,7 +44,10 @@ from service.store.references import CameraId, counting_source
 
 
 class TrackRecord(Record):
-    """A stored track: points (N, 3), boxes (N, 4) and heads (N, 2) as little-endian float64."""
+    """A stored track: points (N, 3), boxes (N, 4) and heads (N, 2) as little-endian float64.
+
+    `first_px` is the number of the first pixel in its post; None if the post stated an image size.
+    """
 
     __tablename__ = "tracks"
 
@@ -57,6 +61,7 @@ class TrackRecord(Record):
     boxes: Mapped[bytes | None] = mapped_column(LargeBinary)
     heads: Mapped[bytes | None] = mapped_column(LargeBinary)
     received_at: Mapped[datetime]
+    first_px: Mapped[int | None]
 
     __table_args__ = (
         UniqueConstraint("camera_id", "source", "track_id", "started_s"),
@@ -78,6 +83,7 @@ class StoredTrack(NamedTuple):
     boxes: bytes | None
     heads: bytes | None
     received_at: datetime
+    first_px: int | None
 
 
 _COLUMNS = [getattr(TrackRecord, name) for name in StoredTrack._fields]
@@ -344,6 +350,51 @@ def forget(session: Session, camera_id: str, before: datetime, keep: int, limit:
     outlived = (TrackRecord.received_at < before) | TrackRecord.id.in_(surplus)
     bite = select(TrackRecord.id).where(of_camera, outlived).order_by(TrackRecord.id).limit(limit)
     return delete_some(session, TrackRecord.id, bite)
+
+
+_BITE = 500  # tracks that are unpacked at once
+
+
+def rescale(session: Session, camera_id: str, source: str, old: Scaling, new: Scaling) -> int:
+    """Map the stored tracks of a source to the frame by another scaling; return their number.
+
+    Tracks that were posted with an image size keep their pixels. `old` is the scaling by which the
+    others were stored.
+    """
+    packed = TrackRecord.points, TrackRecord.boxes, TrackRecord.heads
+    query = (
+        select(TrackRecord.id, TrackRecord.first_px, *packed)
+        .where(
+            TrackRecord.camera_id == camera_id,
+            TrackRecord.source == source,
+            TrackRecord.first_px.is_not(None),
+        )
+        .order_by(TrackRecord.id)
+        .limit(_BITE)
+    )
+
+    def mapped(data: bytes | None, columns: int, apart: int, first: int = 0) -> bytes | None:
+        if data is None:
+            return None
+        array = unpack(data, columns)
+        array[:, first:] = new.applied(old.inverted(array[:, first:]) + apart)
+        return pack(array)
+
+    count, last = 0, -1
+    while rows := session.execute(query.where(TrackRecord.id > last)).all():
+        changed = []
+        for pk, first_px, points, boxes, heads in rows:
+            # Shares count from 0, also in a text that counts pixels from 1.
+            apart = (first_px or 0) * (int(new.normalised) - int(old.normalised))
+            rescaled = {
+                "points": mapped(points, 3, apart, first=1),
+                "boxes": mapped(boxes, 4, apart),
+                "heads": mapped(heads, 2, apart),
+            }
+            changed.append({"id": pk} | rescaled)
+        session.execute(update(TrackRecord), changed)
+        count, last = count + len(rows), rows[-1].id
+    return count
 
 
 def existing(session: Session, track_pks: Sequence[int]) -> set[int]:

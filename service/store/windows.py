@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, ForeignKey, Select, and_, exists, func, select
+from sqlalchemy import ColumnElement, ForeignKey, Select, and_, delete, exists, func, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
@@ -212,6 +212,13 @@ def add_predictions(session: Session, rows: Sequence[dict[str, Any]]) -> None:
     """Insert predictions; a second run of the same job changes nothing."""
     if rows:
         session.execute(new_rows(PredictionRecord.__table__), rows)
+
+
+def forget_predictions(session: Session, camera_id: str, source: str) -> None:
+    """Delete the predictions on the tracks of a source."""
+    of_source = TrackRecord.camera_id == camera_id, TrackRecord.source == source
+    pks = select(TrackRecord.id).where(*of_source)
+    session.execute(delete(PredictionRecord).where(PredictionRecord.track_pk.in_(pks)))
 
 
 def predictions(

@@ -203,6 +203,7 @@ def fleet_line(
     learned: int | None,
     wanted: int,
     silent_s: float,
+    asked: bool = False,
 ) -> str:
     """A camera's doings, in one line of the fleet.
 
@@ -214,6 +215,7 @@ def fleet_line(
         learned: people of the reference; None where it is ready.
         wanted: as many make a reference.
         silent_s: since the newest track ended.
+        asked: whether a question about the image size of its tracks is open.
     """
     scaled = next((kind for kind in kinds if kind in SCALE_KINDS), None)
     if state == PoseState.DRIFTING and scaled is not None:
@@ -222,6 +224,8 @@ def fleet_line(
         return _("its estimate fails or lacks tracks: the alert says why, and since when")
     if state == PoseState.UNCONNECTED:
         return _("nobody has posted tracks for it yet: its page says how")
+    if asked:
+        return _("a question about its tracks is open: its page asks it")
     if state == PoseState.UNCALIBRATED:
         return _("its pose is found by the people before it: its page has it, to be agreed to")
     if state == PoseState.LEARNING and learned is not None:

@@ -94,6 +94,22 @@ def percent(share: float) -> str:
     return number(100 * share, ".1f" if share > 0.99 else ".0f") + " %"
 
 
+def _other_image_size(v: _Values) -> str:
+    if "speed_mps" not in v:
+        return _(
+            "the {tracks} tracks fit an image of {width_px} x {height_px} pixels: people walk on "
+            "the ground there, at {rescaled_speed_mps:.2f} m/s, but outside it in pixels of the "
+            "camera's frame",
+            **v,
+        )
+    return _(
+        "the {tracks} tracks fit an image of {width_px} x {height_px} pixels: people walk more "
+        "evenly there, at {rescaled_speed_mps:.2f} m/s, than in pixels of the camera's frame, at "
+        "{speed_mps:.2f} m/s",
+        **v,
+    )
+
+
 def _beyond_before(v: _Values) -> str:
     return _(
         "{numbers}: was beyond {limit}; it ends once a move is unlikely",
@@ -327,6 +343,11 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         "{pieces:g} of {tracks:g} tracks are pieces of others' walks: the tracker loses people, "
         "each of whom counts once"
     ),
+    TracksCode.IMAGE_SHARES: N_(
+        "no number of the {tracks} tracks is above {largest_px:.2f}: they look like shares of the "
+        "image, not pixels"
+    ),
+    TracksCode.OTHER_IMAGE_SIZE: _other_image_size,
     ServiceCode.AS_SAID: "{text}",
     ServiceCode.NOBODY_POSTED: N_("no track of anybody has been posted for it yet"),
     ServiceCode.POSE_UNKNOWN: N_(

@@ -7,6 +7,7 @@ from functools import partial
 from models.assessment import Monitored
 from models.effort import limited_effort
 from models.errors import CheckpointError
+from models.tracks.image_size import doubt_image_size
 from service.estimate_queue import (
     begin_look,
     budget_of,
@@ -87,7 +88,11 @@ def _look(
     missing = predict_pending(context, camera_id, unpacked)
     if missing:
         failures.add("averaged estimate", missing)
-    learn_if_due(context, camera_id, unpacked)
+    if not learn_if_due(context, camera_id, unpacked):
+        with store.write(camera_id) as session:
+            rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
+            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
+        return
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked, asked=asked)
@@ -138,10 +143,12 @@ def propose_if_uncalibrated(context: JobContext, camera_id: str, unpacked: Unpac
         people = load_people(session, context.settings, camera_id, unpacked)
     if people is None:
         return False
-    found = compute_proposal(people)
-    if found is not None:
+    doubt = doubt_image_size(people.unstated, people.intrinsics, None)
+    found = None if doubt is not None else compute_proposal(people)
+    if found is not None or doubt is not None or people.doubted:
         with context.store.write(camera_id) as session:
-            save_proposal(session, camera_id, people, found)
+            save_proposal(session, camera_id, people, found, doubt)
+    if found is not None:
         log.info("pose_proposed", extra={"camera_id": camera_id, "tracks": len(people.tracks)})
     return True
 
@@ -182,16 +189,21 @@ def _predict_all(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
             save_predictions(session, pending.model.id, rows)
 
 
-def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
-    """Learn a camera's reference, once its tracks are there; until then, count what is."""
+def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> bool:
+    """Learn a camera's reference once there are enough tracks; False if they are in doubt.
+
+    Nothing is learned or estimated from tracks that seem to be in pixels of another image, until
+    the question about them is answered.
+    """
     with context.store.read() as session:
         period = load_reference_period(session, context.settings, camera_id, unpacked)
     if period is None:
-        return
-    if not period.enough:
+        return True
+    doubt = doubt_image_size(period.unstated, period.intrinsics, period.prior)
+    if doubt is not None or not period.enough:
         with context.store.write(camera_id) as session:
-            save_progress(session, camera_id, period)
-        return
+            save_progress(session, camera_id, period, doubt)
+        return doubt is None
     learned = compute_reference(period, context.settings.seed)
     with context.store.write(camera_id) as session:
         save_reference(session, context.settings, camera_id, period, learned)
@@ -199,6 +211,7 @@ def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> Non
         "reference_learned" if learned else "reference_without_walkers",
         extra={"camera_id": camera_id, "tracks": len(period.trajectories)},
     )
+    return True
 
 
 def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:

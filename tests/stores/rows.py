@@ -43,6 +43,7 @@ def put_tracks(connection: Connection, camera_id: str, found: Iterable[IncomingT
             "boxes": None if track.boxes is None else tracks.pack(track.boxes),
             "heads": None if track.heads is None else tracks.pack(track.heads),
             "received_at": datetime.now(UTC),
+            "first_px": track.first_px,
         }
         for track in found
     ]

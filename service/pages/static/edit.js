@@ -63,4 +63,12 @@ async function remove() {
   if (gone) location.assign("/");
 }
 
-listen(root, { edit, remove });
+/** Answer the question about the image size of the camera's tracks by a change of the camera. */
+async function answerImageSize({ change }) {
+  if (!(await nameMe())) return;
+  const body = JSON.parse(change);
+  if (myName()) body.by = myName();
+  await done(_("Answered."), send(await stored(), "PATCH", path, body));
+}
+
+listen(root, { edit, remove, "image-size": answerImageSize });

@@ -87,6 +87,7 @@ def _add(store: Store, first: int, end: int) -> None:
                 "ended_s": came.timestamp(),
                 "points": points,
                 "received_at": came,
+                "first_px": 0,
             }
         )
     with store.write(camera_id(0)) as session:

@@ -103,6 +103,16 @@ SAID = [
     (T.PRIOR_POSE_DOUBTED, {"tilt_rad": math.radians(5), "roll_rad": math.radians(-0.3)},
      "the reference tracks put the camera +5.0 deg in tilt and -0.3 deg in roll from its prior "
      "pose: the prior pose is wrong, or the camera had moved before"),
+    (T.IMAGE_SHARES, {"tracks": 40, "largest_px": 0.9312},
+     "no number of the 40 tracks is above 0.93: they look like shares of the image, not pixels"),
+    (T.OTHER_IMAGE_SIZE, {"tracks": 200, "width_px": 640, "height_px": 360,
+                          "sizes_px": ["640x360"], "rescaled_speed_mps": 1.312, "speed_mps": 6.2},
+     "the 200 tracks fit an image of 640 x 360 pixels: people walk more evenly there, at 1.31 m/s, "
+     "than in pixels of the camera's frame, at 6.20 m/s"),
+    (T.OTHER_IMAGE_SIZE, {"tracks": 200, "width_px": 640, "height_px": 360,
+                          "sizes_px": ["640x360"], "rescaled_speed_mps": 1.312},
+     "the 200 tracks fit an image of 640 x 360 pixels: people walk on the ground there, at "
+     "1.31 m/s, but outside it in pixels of the camera's frame"),
     (S.AS_SAID, {"text": "it has turned"}, "it has turned"),
     (S.LEARNING_REFERENCE, {}, "the reference is being learned"),
     (S.NOBODY_POSTED, {}, "no track of anybody has been posted for it yet"),
