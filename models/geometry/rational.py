@@ -91,7 +91,7 @@ def _longest_ray(coefficients: Array, corner: float) -> float:
         np.polymul(np.polyder(above), below), np.polymul(above, np.polyder(below))
     )
     growth = np.polyadd(np.polymul(above, below), np.polymul([2.0, 0.0], slope))
-    edge = min(first_fold(growth.tolist()), first_fold(below.tolist()), _LONGEST)
+    edge = min(first_fold(tuple(growth.tolist())), first_fold(tuple(below.tolist())), _LONGEST)
     radii = np.linspace(0, edge, _RADII)[:-1]
     s = radii * radii
     image = radii * np.polyval(above, s) / np.polyval(below, s)
