@@ -35,6 +35,7 @@ class ServiceCode(StrEnum):
     TRACKS_WAIT = "tracks_wait"
     TRACKS_LEFT_OUT = "tracks_left_out"
     BY_PICTURE = "by_picture"
+    AWAITING_IMAGE = "awaiting_image"
     PICTURE_SHIFTED = "picture_shifted"
     SITE_CHANGED = "site_changed"
     PICTURE_FROZEN = "picture_frozen"

@@ -49,6 +49,20 @@ class Drift:
         """A parameter's drift in units of its floor."""
         return abs(self.by.of(name)) / max(limits.floor(name), 1e-12)
 
+    def ratios(self, limits: "DriftLimits") -> dict[str, float]:
+        """The drift of each identifiable parameter in units of its floor.
+
+        The floor of an angle is one of the whole turn: 0.8 deg in each of three angles are 1.3 deg.
+        The largest of the angles counts for all of them.
+        """
+        found = {name: self.ratio(name, limits) for name in self.identifiable}
+        angles = [name for name in ANGLES if name in found]
+        if angles:
+            largest = max(angles, key=lambda name: found[name])
+            turned = self.angle_rad / max(limits.floor_rad, 1e-12)
+            found[largest] = max(found[largest], turned)
+        return found
+
     @property
     def has_angle(self) -> bool:
         """True where an angle is identifiable."""
@@ -210,15 +224,15 @@ def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:
     moved = drift.move
     if moved.moved < limits.certainty:
         return {}
-    ratios = {name: drift.ratio(name, limits) for name in (*drift.identifiable, "heading")}
-    if "heading" not in drift.identifiable:
-        ratios["heading"] = min(ratios["heading"], 1.0)
+    ratios = drift.ratios(limits)
+    if "heading" not in ratios:
+        ratios["heading"] = min(drift.ratio("heading", limits), 1.0)
     return {n: r for n, r in ratios.items() if r >= 1 and moved.parameters[n] >= LIKELY}
 
 
 def _is_well(drift: Drift, limits: DriftLimits) -> bool:
-    ratios = [drift.ratio(name, limits) for name in drift.identifiable]
-    return drift.move.moved < LIKELY or max(ratios, default=0.0) < limits.clear_ratio
+    largest = max(drift.ratios(limits).values(), default=0.0)
+    return drift.move.moved < LIKELY or largest < limits.clear_ratio
 
 
 def reason_of_drift(drift: Drift, verdict: DriftVerdict, limits: DriftLimits) -> Reason | None:

@@ -99,12 +99,14 @@ def _learning(
 
 
 def _note_change(reference: SiteReferenceRecord, evidence: Evidence, finding: Finding) -> None:
-    """Have the window begin at a change that was found, between two tracks."""
-    change = finding.change
-    if change is not None:
-        at = evidence.tracks.index(change)
-        reference.window_from_s, reference.changed_s = change.ended_s, change.started_s
-        reference.changed_after_s = evidence.tracks[at - 1].ended_s if at else None
+    """Let the window begin at a change that was found, and keep when it was, if that is known."""
+    change, between = finding.change, finding.between
+    if change is None:
+        return
+    reference.window_from_s, reference.changed_s = change.ended_s, change.started_s
+    reference.changed_after_s = None
+    if between is not None:
+        reference.changed_after_s, reference.changed_s = evidence.times_of(between)
 
 
 def _note_agreement(session: Session, history: History, finding: Finding, camera_id: str) -> None:

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.verdict import DriftLimits
-from models.pose import link_pieces
+from models.pose import MovedBetween, link_pieces
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory
 from models.walking.config import FEWEST_WALKERS
@@ -195,6 +195,20 @@ class Evidence:
     picture: SeenPicture | None = None
     zones: ZonesRecord | None = None
     told: bool = False
+
+    def times_of(self, between: MovedBetween) -> tuple[float | None, float]:
+        """The times after and before which a camera moved; the first is None before all tracks.
+
+        Tracks overlap in time: of the last before the move and the first after it, either may have
+        begun or ended first.
+        """
+        first, last = between.first, between.last
+        before_s = self.tracks[last].started_s
+        if last:
+            before_s = max(before_s, self.tracks[last - 1].ended_s)
+        if not first:
+            return None, before_s
+        return min(self.tracks[first - 1].ended_s, self.tracks[first].started_s), before_s
 
 
 def load_evidence(

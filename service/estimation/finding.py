@@ -22,6 +22,7 @@ from models.pose import (
     Creep,
     FusedEstimate,
     JointEstimate,
+    MovedBetween,
     Observations,
     PartialFailure,
     PoseFinding,
@@ -42,6 +43,7 @@ from models.pose import (
     unless_failed,
     warm_start_from_bytes,
     warm_start_to_bytes,
+    with_time_of_move,
 )
 from models.reasons import Reason
 from models.regression.averaging import (
@@ -126,6 +128,7 @@ class Finding:
     creep: Creep | None
     tracks: tuple[SeenTrack, ...]
     change: SeenTrack | None
+    between: MovedBetween | None = None
     picture: SeenPicture | None = None
     people_moved: bool | None = None
     causes: tuple[Cause, Cause] | None = None
@@ -186,6 +189,8 @@ def compute_finding(
         people_moved = found.posterior.moved >= LIKELY
         # It speaks of the same as the chart, by which the prior may be raised.
         found = replace(found, moved_prior=moved_prior, picture=picture.evidence)
+    timed = partial(with_time_of_move, found, observed, site)
+    found = failures.unless_failed("time of the move", timed) or found
     seen = evidence.tracks[found.first :]
     averaged = _averaged(evidence, seen, seed, failures)
     moved = None
@@ -206,6 +211,7 @@ def compute_finding(
         creep=creep,
         tracks=seen,
         change=None if found.change_idx is None else evidence.tracks[found.change_idx],
+        between=found.between,
         picture=evidence.picture,
         people_moved=people_moved,
         causes=found.causes,

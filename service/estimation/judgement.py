@@ -137,27 +137,28 @@ class Case:
         return PoseState.OK if self.reference.answer == Answer.FALSE_ALARM else PoseState.LEARNING
 
     def _moved_between(self, verdict: DriftVerdict, state: PoseState) -> Times:
-        """When the camera moved, or is suspected to, as far as the tracks tell."""
-        last, reference, tracks = self.history.last, self.reference, self.evidence.tracks
+        """The times between which the camera moved, or may have; None each if not known.
+
+        Fewer than 12 people after the move do not determine when it was: until there are more,
+        there is no time.
+        """
+        last, reference, between = self.history.last, self.reference, self.finding.between
         told = (None, None) if last is None else (last.drift_after, last.drift_since)
         if verdict.streak <= 0 and state != PoseState.SUSPECTED:
             return told if verdict.drifting else (None, None)
-        if reference.changed_s is not None:
+        if reference.changed_s is not None and reference.changed_after_s is not None:
             return _between(reference.changed_after_s, reference.changed_s)
-        if told[1] is not None:
-            return told
-        # As was learned; or as somebody said, whose answer has the window begin.
-        stood_s = max(reference.to_s or 0.0, reference.window_from_s or 0.0)
-        chart, creep = self.finding.reading, self.finding.creep
-        if chart is not None and chart.moved:
-            at = chart.track_idx
-            return _between(tracks[at - 1].ended_s if at else stood_s, tracks[at].started_s)
-        if creep is not None and creep.moved:
+        if between is not None and (between.first or told[1] is None):
+            after_s, before_s = self.evidence.times_of(between)
+            # In its position as it was learned; or at a person's answer, with which a window begins
+            # that no change has begun.
+            answered_s = reference.window_from_s if reference.changed_s is None else None
+            stood_s = max(reference.to_s or 0.0, answered_s or 0.0)
+            return _between(stood_s if after_s is None else after_s, before_s)
+        creep = self.finding.creep
+        if told[1] is None and creep is not None and creep.moved:
             return None, from_seconds(creep.since_day * DAY_S)
-        # One pose since the reference, and never another one: it had moved before all of them.
-        if last is None:
-            return _between(stood_s, self.finding.tracks[0].ended_s)
-        return _between(last.to_s, self.finding.tracks[-1].ended_s)
+        return told
 
     def _reasons(self, verdict: DriftVerdict, cause: Reason | None) -> Reasons:
         """The reasons, those that matter most first."""
@@ -182,8 +183,6 @@ class Case:
         )
 
 
-def _between(stood_s: float | None, moved_s: float) -> Times:
-    """The times of a move between a person before it and one after it, who may overlap."""
-    if stood_s is None:
-        return None, from_seconds(moved_s)
-    return from_seconds(min(stood_s, moved_s)), from_seconds(max(stood_s, moved_s))
+def _between(after_s: float, before_s: float) -> Times:
+    """The times of a move; tracks overlap, so that either may be the earlier one."""
+    return from_seconds(min(after_s, before_s)), from_seconds(max(after_s, before_s))

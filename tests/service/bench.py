@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose
-from models.pose import pose_posterior, smallest_told
+from models.pose import MovedBetween, pose_posterior, smallest_told
 from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.reasons import Reason, TracksCode
 from models.regression.recipe import plan_to_config
@@ -137,6 +137,7 @@ def made_up(
     posterior = pose_posterior(fused, joint.walking_groups, evidence.prior)
     seen = evidence.tracks[change or 0 :]
     return Finding(
+        between=MovedBetween(first=change or 0, last=change or 0),
         joint=joint,
         fused=fused,
         posterior=posterior,
