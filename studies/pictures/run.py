@@ -56,18 +56,18 @@ def main(arguments: Sequence[str]) -> None:
     """Run what is asked for, and print or write its tables."""
     asked = _parser().parse_args(arguments)
     cv2.setNumThreads(1)
-    parts = []
-    if asked.folders and not asked.cost:
-        parts += _of_photographs(asked)
-    if asked.before and asked.after:
-        parts.append(real_table(*_real(asked.before, asked.after, asked.focal_px)))
-        parts.append(moves_table(_moves(asked)))
+    texts: dict[str, list[str]] = {}
     if asked.folders:
-        parts.append(cost_line(*_cost(photographs(asked.folders))))
-    text = "\n".join(parts)
-    Console().print(text, markup=False, highlight=False, soft_wrap=True)
-    if asked.write:
-        write_between(asked.write, markers("pictures", COMMAND), text)
+        made = [] if asked.cost else _of_photographs(asked)
+        texts["pictures"] = [*made, cost_line(*_cost(photographs(asked.folders)))]
+    if asked.before and asked.after:
+        real = real_table(*_real(asked.before, asked.after, asked.focal_px))
+        texts["real pictures"] = [real, moves_table(_moves(asked))]
+    for name, parts in texts.items():
+        text = "\n".join(parts)
+        Console().print(text, markup=False, highlight=False, soft_wrap=True)
+        if asked.write:
+            write_between(asked.write, markers(name, COMMAND), text)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -102,10 +102,12 @@ def made_up(
     paths=False,
     changed=False,
     causes=None,
+    timed=True,
 ) -> Finding:
     """What the tracks of a window come to: a pose, whose heading is identifiable by their `paths`.
 
-    Where these have `changed`, people walk on none of them.
+    Where these have `changed`, people walk on none of them. Unless `timed`, too few came after a
+    move to know when it was.
     """
     values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
     missing = f"the tracks cannot tell {' and '.join(unidentifiable)}"
@@ -137,7 +139,7 @@ def made_up(
     posterior = pose_posterior(fused, joint.walking_groups, evidence.prior)
     seen = evidence.tracks[change or 0 :]
     return Finding(
-        between=MovedBetween(first=change or 0, last=change or 0),
+        between=MovedBetween(first=change or 0, last=change or 0) if timed else None,
         joint=joint,
         fused=fused,
         posterior=posterior,
