@@ -10,8 +10,8 @@ from enum import StrEnum
 class PoseState(StrEnum):
     """The state of a camera.
 
-    It is unconnected until the first track for it is stored, and uncalibrated until a person has
-    agreed to a prior pose.
+    It is unconnected until the first track for it is stored or an image was compared, and
+    uncalibrated until a person has confirmed a prior pose.
     """
 
     UNCONNECTED = "unconnected"

@@ -35,6 +35,7 @@ class ServiceCode(StrEnum):
     TRACKS_WAIT = "tracks_wait"
     TRACKS_SKIPPED = "tracks_skipped"
     BY_PICTURE = "by_picture"
+    AWAITING_IMAGE = "awaiting_image"
     PICTURE_SHIFTED = "picture_shifted"
     PICTURE_FROZEN = "picture_frozen"
     PICTURE_BLACK = "picture_black"

@@ -172,11 +172,16 @@ def is_before(to_s: float, bounds: WindowBounds) -> bool:
 
 
 def made_against(reference: SiteReferenceRecord, estimate: EstimateRecord) -> bool:
-    """True where an estimate was made against a reference, not while that was being learned."""
-    if reference.ready_at is None or estimate.reference_id != reference.id:
+    """True if an estimate was made against a reference, and not while that was being learned.
+
+    Without tracks nothing is learned: an estimate by images alone is against the prior pose.
+    """
+    if estimate.reference_id != reference.id:
         return False
     if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
         return False  # a person has answered it
+    if reference.ready_at is None:
+        return reference.source is None
     return estimate.created_at >= reference.ready_at
 
 

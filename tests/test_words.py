@@ -35,6 +35,7 @@ OTHERS = {
     ("estimation/estimates.py", "picture"): "the key of an estimator's answer",
     ("estimation/picture_estimates.py", "picture"): "the key of an estimator's answer",
     ("estimation/seen_picture.py", "picture"): "the key of an estimator's answer",
+    ("cameras/poses.py", "picture"): "the key of an estimator's answer",
     ("pages/drawings/ground_plan.py", "picture"): "a class of a drawing",
     ("pages/drawings/picture.py", "picture"): "a class of a drawing",
     ("workers/estimate.py", "picture"): "the part of an estimate that failed",

@@ -178,6 +178,9 @@ table(
     *optional(DateTime, "other_at", "stood_at"),
     *needed(JSON, "agreement"),
     *optional(LargeBinary, "unmatched", "stood_jpeg"),
+    *optional(NUMBER, "inliers"),
+    *needed(NUMBER, "compared"),
+    *needed(JSON, "earlier"),
 )
 table(
     "zones",

@@ -1,7 +1,7 @@
 """Assess a camera: has it moved, and where is it now. `assess` is the one way to that answer."""
 
 from models.assessment.assess import DatedFactor, Monitored, assess, conclude, monitor, next_state
-from models.assessment.decide import change_of, is_site_changed
+from models.assessment.decide import change_in, is_site_changed
 from models.assessment.monitor import AlarmRate, alarm_chart_result, tracks_a_year
 from models.assessment.observe import MOST_PIECES
 from models.assessment.reasons import reason_of_drift
@@ -38,7 +38,7 @@ __all__ = [
     "alarm_chart_result",
     "assess",
     "begin_creep_log",
-    "change_of",
+    "change_in",
     "conclude",
     "is_site_changed",
     "judge",

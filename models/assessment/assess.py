@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from models.assessment.decide import change_of, decide
+from models.assessment.decide import change_in, decide
 from models.assessment.estimate import detectable_moves, raised_by_slow_drift, since_alarm
 from models.assessment.explain import explain
 from models.assessment.monitor import chart_of, slow_drift_of
@@ -28,7 +28,13 @@ from models.assessment.values import (
 from models.errors import TooFewTrajectoriesError
 from models.monitoring.chart import ChartResult
 from models.monitoring.creep import Creep
-from models.pose.estimating import PartialFailure, PoseFinding, estimate_pose, unless_failed
+from models.pose.estimating import (
+    PartialFailure,
+    PoseFinding,
+    estimate_pose,
+    unless_failed,
+    with_time_of_move,
+)
 from models.pose.factors import Factor
 from models.pose.pose_fit import WarmStart
 from models.pose.site import CameraSite, assume_site
@@ -162,6 +168,8 @@ def assess(
         # The chart, which may have raised the prior, is evidence of the same move.
         parts = tuple(each.factor for each in counting)
         found = replace(found, moved_prior=moved_prior, factors=parts)
+    timed = partial(with_time_of_move, found, observed.tracks, site)
+    found = unless_failed(failed, "time of the move", timed) or found
     assessment = conclude(
         observed,
         found,
@@ -222,7 +230,7 @@ def next_state(state: AssessmentState, found: Assessment) -> AssessmentState:
         drifted=decision.verdict.drifted,
         alerted=decision.verdict.drifting,
         unsure=decision.state == CameraState.UNSURE,
-        change=change_of(found.observed, found.estimated) or state.change,
+        change=change_in(found.observed, found.estimated) or state.change,
         moved_at=decision.moved_at,
         assessed_until_s=found.observed.ended_s[-1],
         warm_start=found.warm_start,

@@ -29,6 +29,7 @@ from models.monitoring.drift import LIKELY
 from models.pose import config
 from models.pose.estimating import PoseFinding
 from models.pose.hypotheses import PosePosterior
+from models.pose.move_time import MovedBetween
 from models.pose.pose_fit import FusedEstimate
 from models.reasons import Reason
 
@@ -69,7 +70,7 @@ def decide(
     )
     if cause is None and counting is not None and verdict.alarmed:
         cause = charted_clock(counting, posterior.turned)
-    moved_at = _moved_at(observed, found, chart, slow_drift, verdict, camera, state)
+    moved_at = _moved_at(observed, found, slow_drift, verdict, camera, state)
     return Decision(state=camera, verdict=verdict, cause=cause, moved_at=moved_at)
 
 
@@ -139,43 +140,55 @@ def _counting_chart(
 def _moved_at(
     observed: Observed,
     found: PoseFinding,
-    chart: ChartResult | None,
     slow_drift: Creep | None,
     verdict: Verdict,
     camera: CameraState,
     state: AssessmentState,
 ) -> TimeSpan:
-    """The time of a move, or of a suspected one, as far as the tracks reveal it."""
+    """The time of a move, or of a suspected one; unknown until 12 people came after it."""
     reported = state.moved_at or NO_TIME
     if verdict.streak <= 0 and camera != CameraState.SUSPECTED:
         return reported if verdict.drifting else NO_TIME
-    change = change_of(observed, found) or state.change
-    if change is not None:
-        return _between(change.after_s, change.before_s)
-    if reported.before_s is not None:
-        return reported
-    if chart is not None and chart.moved:
-        at = chart.track_idx
-        after_s = observed.ended_s[at - 1] if at else state.stationary_until_s
-        return _between(after_s, observed.started_s[at])
-    if slow_drift is not None and slow_drift.moved:
+    change = change_in(observed, found) or state.change
+    if change is not None and change.after_s is not None:
+        return _in_order(change)
+    if found.between is not None and (found.between.first or reported.before_s is None):
+        span = times_of(observed, found.between)
+        if span.after_s is None:
+            span = TimeSpan(state.stationary_until_s, span.before_s)
+        return _in_order(span)
+    if reported.before_s is None and slow_drift is not None and slow_drift.moved:
         return TimeSpan(None, slow_drift.since_day * DAY_S)
-    # One pose since the reference and never another: it had moved before all of these tracks.
-    if state.assessed_until_s is None:
-        return _between(state.stationary_until_s, observed.ended_s[found.first])
-    return _between(state.assessed_until_s, observed.ended_s[-1])
+    return reported
 
 
-def change_of(observed: Observed, found: PoseFinding) -> TimeSpan | None:
-    """The time of the change that was found in a window, between two tracks; None without one."""
-    at = found.change_idx
-    if at is None:
+def change_in(observed: Observed, found: PoseFinding) -> TimeSpan | None:
+    """The time of the change that was found in a window; None without one.
+
+    Its beginning is None if too few people came after it to know.
+    """
+    if found.change_idx is None:
         return None
-    return TimeSpan(observed.ended_s[at - 1] if at else None, observed.started_s[at])
+    if found.between is not None:
+        return times_of(observed, found.between)
+    return TimeSpan(None, observed.started_s[found.change_idx])
 
 
-def _between(after_s: float | None, before_s: float | None) -> TimeSpan:
-    """The time of a move between one person before it and one after it, who may overlap."""
+def times_of(observed: Observed, between: MovedBetween) -> TimeSpan:
+    """The times after and before which a camera moved; the first is None before all tracks.
+
+    Tracks overlap in time: of the last before the move and the first after it, either may have
+    begun or ended first.
+    """
+    first, last = between.first, between.last
+    started_s, ended_s = observed.started_s, observed.ended_s
+    before_s = max(started_s[last], ended_s[last - 1]) if last else started_s[last]
+    return TimeSpan(min(ended_s[first - 1], started_s[first]) if first else None, before_s)
+
+
+def _in_order(span: TimeSpan) -> TimeSpan:
+    """The span of a move; tracks overlap, so that either end may be the earlier one."""
+    after_s, before_s = span
     if after_s is None or before_s is None:
-        return TimeSpan(None, before_s)
+        return span
     return TimeSpan(min(after_s, before_s), max(after_s, before_s))

@@ -86,12 +86,12 @@ def _beyond(drift: Drift, limits: DriftLimits) -> dict[str, float]:
     moved = drift.move
     if moved.moved < limits.certainty:
         return {}
-    ratios = {name: drift.ratio(name, limits) for name in (*drift.identifiable, "heading")}
-    if "heading" not in drift.identifiable:
-        ratios["heading"] = min(ratios["heading"], 1.0)
+    ratios = drift.ratios(limits)
+    if "heading" not in ratios:
+        ratios["heading"] = min(drift.ratio("heading", limits), 1.0)
     return {n: r for n, r in ratios.items() if r >= 1 and moved.parameters[n] >= LIKELY}
 
 
 def _is_well(drift: Drift, limits: DriftLimits) -> bool:
-    ratios = [drift.ratio(name, limits) for name in drift.identifiable]
-    return drift.move.moved < LIKELY or max(ratios, default=0.0) < limits.clear_ratio
+    largest = max(drift.ratios(limits).values(), default=0.0)
+    return drift.move.moved < LIKELY or largest < limits.clear_ratio

@@ -51,6 +51,20 @@ class Drift:
         """A parameter's drift in units of its floor."""
         return abs(self.by.of(name)) / max(limits.floor(name), 1e-12)
 
+    def ratios(self, limits: "DriftLimits") -> dict[str, float]:
+        """The drift of each identifiable parameter in units of its floor.
+
+        The floor of an angle is one of the whole turn: 0.8 deg in each of three angles are 1.3 deg.
+        The largest of the angles counts for all of them.
+        """
+        found = {name: self.ratio(name, limits) for name in self.identifiable}
+        angles = [name for name in ANGLES if name in found]
+        if angles:
+            largest = max(angles, key=lambda name: found[name])
+            turned = self.angle_rad / max(limits.floor_rad, 1e-12)
+            found[largest] = max(found[largest], turned)
+        return found
+
     @property
     def has_angle(self) -> bool:
         """True where an angle is identifiable."""

@@ -18,9 +18,18 @@ from models.pose.estimating import (
     PoseFinding,
     estimate_pose,
     unless_failed,
+    with_time_of_move,
 )
 from models.pose.hypotheses import Hypothesis, PosePosterior, drift_of, pose_posterior
-from models.pose.picture import PictureEvidence, posterior_by_picture, with_picture
+from models.pose.move_time import MovedBetween
+from models.pose.picture import (
+    PictureEvidence,
+    drift_by_images,
+    of_agreeing,
+    posterior_by_picture,
+    turn_by_pose,
+    with_picture,
+)
 from models.pose.pose_fit import (
     FusedEstimate,
     Rival,
@@ -64,7 +73,12 @@ __all__ = [
     "Observations",
     "PartialFailure",
     "PoseFinding",
+    "MovedBetween",
+    "with_time_of_move",
     "PictureEvidence",
+    "of_agreeing",
+    "drift_by_images",
+    "turn_by_pose",
     "PosePosterior",
     "posterior_by_picture",
     "with_picture",

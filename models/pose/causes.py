@@ -13,22 +13,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.geometry.intrinsics import Intrinsics, Projection
+from models.geometry.intrinsics import Projection
 from models.geometry.pose import array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import CLOCK
 from models.monitoring.config import HABITS_OF_DAYS
 from models.paths.likelihood import Walkers, walkers_of
-from models.paths.reference import PathReference
 from models.pose import config
 from models.pose.hypotheses import PosePosterior, degrees_of_freedom, log_tail, times_chance
 from models.pose.pose_fit import FusedEstimate
 from models.pose.site import CameraSite
+from models.pose.track_likelihoods import place_log_likelihoods, speed_log_likelihoods
 from models.tracks.observations import Observations, Steps
 from models.walking.config import FEWEST_GROUPS
 from models.walking.estimate import JointEstimate
-from models.walking.fit import track_log_likelihoods
-from models.walking.speed_reference import channels_of
 
 _STEP = 0.04  # of the log of a factor
 CLOCK_LOGS: Array = _STEP * np.arange(-10.0, 11.0)
@@ -69,12 +67,11 @@ def cause_gains(
 
     A fisheye is asked for its clock alone: another focal length bends its rays otherwise.
     """
-    paths = site.paths
-    if paths is None or fused.paths_changed or joint.walking_groups < FEWEST_GROUPS:
+    if site.paths is None or fused.paths_changed or joint.walking_groups < FEWEST_GROUPS:
         return None
     prior = array_of(site.prior)
     walkers = walkers_of(tracks, np.append(joint.values, prior[3]))
-    speeds, places = _speeds(tracks, site, prior), _places(walkers, paths, site.intrinsics, prior)
+    speeds, places = _speeds(tracks, site, prior), _places(walkers, site, prior)
 
     def clock(log: float) -> float:
         steps = replace(tracks.steps, seconds=tracks.steps.seconds * math.exp(log))
@@ -87,7 +84,7 @@ def cause_gains(
         seen = replace(walkers, steps=_zoomed_steps(walkers.steps, zoom))
         lens = replace(site.intrinsics, fx=site.intrinsics.fx * zoom, fy=site.intrinsics.fy * zoom)
         by_speeds = _speeds(_zoomed(tracks, zoom), site, prior) - speeds
-        return by_speeds, _places(seen, paths, lens, prior) - places
+        return by_speeds, _places(seen, replace(site, intrinsics=lens), prior) - places
 
     if max(max(clock(log), sum(lens(log))) for log in (-_FIRST, _FIRST)) < config.CAUSE_GAIN:
         return None
@@ -97,10 +94,7 @@ def cause_gains(
         clock=np.array([clock(log) for log in CLOCK_LOGS]),
         lens_speeds=gains[:, 0],
         lens_places=gains[:, 1],
-        pose=_speeds(tracks, site, found)
-        + _places(walkers, paths, site.intrinsics, found)
-        - speeds
-        - places,
+        pose=_speeds(tracks, site, found) + _places(walkers, site, found) - speeds - places,
     )
 
 
@@ -176,16 +170,11 @@ def _against(*log_odds: float) -> float:
 
 
 def _speeds(tracks: Observations, site: CameraSite, candidate: Array) -> float:
-    reference = site.speed_reference
-    turned = replace(site.prior, heading_rad=math.remainder(float(candidate[3]), 2 * math.pi))
-    channels = channels_of(tracks, reference, turned)
-    each = track_log_likelihoods(channels, candidate[:3] + reference.offset)
-    return float(each.sum()) / reference.pose_variance_inflation
+    return float(speed_log_likelihoods(tracks, site, candidate).sum())
 
 
-def _places(walkers: Walkers, paths: PathReference, lens: Intrinsics, candidate: Array) -> float:
-    each = paths.model(lens).track_log_likelihoods(walkers, candidate[None])
-    return float(each.sum()) / paths.variance_inflation_for(walkers.people)
+def _places(walkers: Walkers, site: CameraSite, candidate: Array) -> float:
+    return float(place_log_likelihoods(walkers, site, candidate[None]).sum())
 
 
 def _zoomed(tracks: Observations, zoom: float) -> Observations:

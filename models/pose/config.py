@@ -49,6 +49,12 @@ HABITS = (
 # another view may be a better one.
 BETTER_VIEW = 2.0
 
+# When the camera moved.
+MOVE_TIME_LEVEL = 0.9  # of the interval that is reported
+# Of tracks may be of neither pose: bounds what one of them says of the time. With fewer, the
+# interval is narrower and misses more.
+ODD_TRACKS = 0.02
+
 # When a warm start is enough: estimates from one are then within 0.05 sd of a full search.
 WARM_TRACKS = 150  # at least: of fewer a full search is soon made, and each counts for much
 NEW = 0.5  # of the window since the last full search; with a quarter, estimates are no nearer
@@ -85,9 +91,23 @@ LENS_SD = 0.25  # of the log of the focal length, where a lens was zoomed
 CAUSE_MOVED = 0.1  # likely moved: of less, causes are asked with each full search alone
 CAUSE_NAMED = 0.9  # of a change that is certain: else it has the name of a move
 LENS_BY_SPEEDS = 0.8  # of what speeds gain by a clock they gain by a lens, where it is one
-# A picture beside the people.
-PICTURE_FREEDOM = 5.0  # of Student's t: light and leaves move matches beyond residuals
-PICTURE_WRONG = 1e-4  # of matches are of something else: `python -m studies pictures` counts them
+# An image beside the people.
+# Degrees of freedom of its Student's t: likeliest are 5 in 30 comparisons across a real change of
+# light with some 25 inliers (../shared/pictures), and 20 or more in 139 turns of photographs with
+# 150 or more. With more degrees, a small turn needs fewer inliers; a wrong one counts for more.
+LEAST_IMAGE_FREEDOM, INLIERS_OF_A_DEGREE = 4.0, 20.0
+# The chance that a match is wrong. Of 1,060 pairs of two scenes, one matched, by the fewest inliers
+# (`python -m studies pictures`); of 1,673 others, 483 had a consensus of 3, 61 of 4 and 1 of 5, so
+# a tenth in each 4 inliers is cautious. What remains however many agree (a lorry, a banner) is the
+# bound of 10,070 pairs of one pose without a false move, 3e-4 at 95 %, in its middle.
+WRONG_OF_FEWEST, FEWEST_MATCHED, INLIERS_OF_A_TENTH = 1e-3, 8, 4.0
+WRONG_OF_MANY = 1e-4
+# What images have in common does not average out: a wrong reference makes all of them wrong, and
+# the places of its features are in each comparison. That share of the variance is a sixth in 30
+# turns by two references of one pose (../shared/pictures), more here; the chance is a guess, a
+# tenth of that of one image.
+WRONG_OF_ALL, COMMON_VARIANCE = 1e-5, 0.25
+AGREE_BY_CHANCE = 1e-3  # of images that agree seem not to: a chi square of three angles
 SITE_CHANGES, MOVED_SINCE = 0.02, 0.02  # of windows: people go elsewhere; it moved after them
 PICTURED = 0.5  # likelier right than wrong
 # How often paths are not found again: of cameras turned far, and of those that stand.

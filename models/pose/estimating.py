@@ -10,8 +10,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from models.geometry.pose import CameraPose
-from models.monitoring.drift import Drift, pose_after
+from models.geometry.pose import CameraPose, array_of
+from models.geometry.rotation import Array
+from models.monitoring.drift import LIKELY, Drift, pose_after
 from models.paths.likelihood import walkers_of
 from models.paths.path_tests import moved_within
 from models.pose import config
@@ -20,6 +21,7 @@ from models.pose.change_point import find_change, moved_beyond_doubt, suspicion,
 from models.pose.factors import Factor
 from models.pose.fusion import fused_estimate
 from models.pose.hypotheses import PosePosterior, drift_of, pose_posterior
+from models.pose.move_time import MovedBetween, moved_between
 from models.pose.pose_fit import (
     FullSearch,
     FusedEstimate,
@@ -52,7 +54,8 @@ class PoseFinding:
     beside. `warm_start` is where the next estimate may begin; None where it has to search all
     poses. `moved_prior` is how likely it was, before any track, that the camera has moved.
     `factors` are evidence beside the tracks. `gains` are what other causes than a move explain;
-    None where nothing looks like one.
+    None where nothing looks like one. `between` is when the camera moved, among the tracks of the
+    whole window; None if that is not known.
     """
 
     prior: CameraPose
@@ -65,6 +68,7 @@ class PoseFinding:
     moved_prior: float = config.MOVED_PRIOR
     factors: tuple[Factor, ...] = ()
     gains: CauseGains | None = None
+    between: MovedBetween | None = None
 
     @cached_property
     def posterior(self) -> PosePosterior:
@@ -139,6 +143,7 @@ def estimate_pose(
         first=found.first,
         failures=tuple(failures),
         warm_start=None if failures else found.warm_start,
+        between=found.between,
     )
     refined = warm_start is not None and found.searched_before(warm_start)
     if refined and not alerted and finding.posterior.moved < config.CAUSE_MOVED:
@@ -146,6 +151,21 @@ def estimate_pose(
     ask = partial(cause_gains, found.tracks, site, finding.joint, finding.fused)
     gains = unless_failed(failures, "causes", ask)
     return replace(finding, gains=gains, failures=tuple(failures))
+
+
+def with_time_of_move(found: PoseFinding, tracks: Observations, site: CameraSite) -> PoseFinding:
+    """The finding of a window with when the camera moved, if it moved likelier than not.
+
+    The move is from the prior pose, unless a change within the window was found.
+    """
+    if found.between is not None or found.posterior.moved < LIKELY or not site.learned:
+        return found
+
+    def fit(later: Observations) -> Array:
+        return pose_fit_of(later, site).fused.values
+
+    at = array_of(site.prior), found.fused.values
+    return replace(found, between=moved_between(tracks, site, *at, fit))
 
 
 def _at_site(warm_start: WarmStart | None, site: CameraSite) -> WarmStart | None:
@@ -175,7 +195,7 @@ class ChangeSearch:
 
     `change_idx` is the first track after the change; None where there was none. `first` is the
     first that ended with it or later: `tracks` are from there on. `warm_start` is where a next
-    search may begin; None where this one suspects something.
+    search may begin; None where this one suspects something. `between` is when the change was.
     """
 
     change_idx: int | None
@@ -183,6 +203,7 @@ class ChangeSearch:
     tracks: Observations
     fit: PoseFit
     warm_start: WarmStart | None = None
+    between: MovedBetween | None = None
 
     def searched_before(self, begun: WarmStart) -> bool:
         """True if all that was done is to refine the pose that it began at."""
@@ -252,7 +273,11 @@ def _confirmed(tracks: Observations, site: CameraSite, change_idx: int) -> Chang
         return None
     fused = widened(before.fused, after.fused, groups, site.speed_reference, site.paths)
     return ChangeSearch(
-        change_idx=change_idx, first=first, tracks=later, fit=replace(after, fused=fused)
+        change_idx=change_idx,
+        first=first,
+        tracks=later,
+        fit=replace(after, fused=fused),
+        between=moved_between(tracks, site, before.fused.values, after.fused.values),
     )
 
 

@@ -76,12 +76,12 @@ class PosePosterior:
     @property
     def moved(self) -> float:
         """The probability that the camera moved."""
-        return float(self.weights[1:].sum())
+        return min(float(self.weights[1:].sum()), 1.0)  # a sum may exceed 1 by rounding
 
     @property
     def move(self) -> MoveProbabilities:
         """How likely a move is, and of what."""
-        shares = (self.weights @ _MOVED_IN).tolist()
+        shares = np.minimum(self.weights @ _MOVED_IN, 1.0).tolist()
         return MoveProbabilities(
             moved=self.moved, parameters=dict(zip(PARAMETERS, shares, strict=True))
         )
@@ -91,7 +91,7 @@ class PosePosterior:
         """The probability that an angle which the tracks tell changed, if the camera moved."""
         angles = self.seen & [name != "height" for name in PARAMETERS]
         turned = float(self.weights @ _MOVED_IN[:, angles].any(axis=1))
-        return turned / max(self.moved, 1e-300)
+        return min(turned / max(self.moved, 1e-300), 1.0)
 
     @property
     def offset(self) -> Array:

@@ -185,7 +185,7 @@ class ServedPoseOut(BaseModel):
                 after=None if estimate is None else estimate.drift_after,
                 before=None if estimate is None else estimate.drift_since,
             ),
-            estimates={} if estimate is None else in_degrees(estimate.raw),
+            estimates=in_degrees(view.estimates),
             reference=ReferenceOut.of(view.reference),
             tracks=0 if estimate is None else estimate.tracks,
             from_=None if estimate is None else from_seconds(estimate.from_s),

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -21,7 +22,7 @@ from service.notifications.outbox import json_time
 from service.reasons import Reasons, ServiceCode
 from service.references import wanted_tracks, window_beside
 from service.settings import Settings
-from service.store import cameras, estimates, references, windows
+from service.store import cameras, estimates, pictures, references, windows
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord
 from service.wording.reasons import in_words
@@ -33,7 +34,8 @@ class PoseView:
 
     `calibrated` once somebody has said or agreed to a prior pose; until then `proposed` is what
     people told of it, and None where there were too few. `question` is open about the image size
-    of its tracks, until which nothing is learned from them.
+    of its tracks, until which nothing is learned from them. `estimates` are those of each
+    estimator, and of the newest image that was compared.
     """
 
     status: CameraStatus
@@ -45,6 +47,7 @@ class PoseView:
     model_id: str | None
     checked_at: datetime | None
     question: ImageQuestion | None
+    estimates: dict[str, Any]
     etag: str
 
     @property
@@ -78,11 +81,15 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
     if estimate is not None:
         pose = replace(pose, **asdict(estimate.pose))
     estimate_id = None if estimate is None else estimate.id
+    raw = {} if estimate is None else dict(estimate.raw)
+    raw.pop("picture", None)  # that of the estimate; clients see the newest
+    if (image := pictures.compared(session, camera_id, prior.id)) is not None:
+        raw["picture"] = image.as_estimate
     # All that the answers are made of: the lens of `pose.yaml`, and reasons by their values, since
     # words round them.
     why, lens = (reasons, in_words(reasons)), camera.intrinsics
     checked = camera.checked_at
-    served = (status.state.value, why, pose, estimate_id, reference, model_id, lens, checked)
+    served = (status.state.value, why, pose, estimate_id, raw, reference, model_id, lens, checked)
     return PoseView(
         status=status,
         calibrated=calibrated,
@@ -93,6 +100,7 @@ def view_pose(session: Session, settings: Settings, camera_id: str) -> PoseView:
         model_id=model_id,
         checked_at=checked,
         question=question_of(reasons, camera),
+        estimates=raw,
         etag=f'"{hashlib.sha256(repr(served).encode()).hexdigest()[:24]}"',
     )
 
@@ -183,6 +191,8 @@ def _missing(
     reference = status.reference
     if status.state == PoseState.UNCONNECTED:
         return [Reason(code=ServiceCode.NOBODY_POSTED)]
+    if reference.source is None:
+        return [Reason(code=ServiceCode.AWAITING_IMAGE, values={"compared": status.images})]
     if reference.ready_at is None:
         wanted = wanted_tracks(reference, settings)
         counts = {"counted": learned.counted, "tracks": learned.tracks, "pieces": learned.pieces}

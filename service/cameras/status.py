@@ -33,7 +33,7 @@ class CameraStatus:
     `judged` where it says how the camera stands now, against its reference; else it is the last
     that is known, or of a reference that is being learned. `cause` is what is waited after until
     then. It is `silent` where nobody has been seen for longer than is usual; `last_track_s` is the
-    end of the newest track of those that count.
+    end of the newest track of those that count. `images` counts those that were compared.
     """
 
     camera_id: str
@@ -47,6 +47,7 @@ class CameraStatus:
     attended: Attendance
     silent: bool
     last_track_s: float | None
+    images: int
 
     @property
     def drift(self) -> Drift | None:
@@ -124,10 +125,12 @@ def _status_of(
     if _holds(alerts):
         estimate = estimate if judged else last_identifiable
         state = PoseState.DRIFTING
-    elif reference.ready_at is None and reference.source is None:
+    elif reference.ready_at is None and reference.source is None and not newest.images:
         state = PoseState.UNCONNECTED  # the first track to be stored gives it a source, for good
     elif newest.assumed:
         state = PoseState.UNCALIBRATED
+    elif judged and estimate is not None and reference.ready_at is None:
+        state = estimate.state  # by images alone
     elif reference.ready_at is None or (not judged and cause != Cause.FALSE_ALARM):
         state = PoseState.LEARNING
     elif silent:
@@ -148,6 +151,7 @@ def _status_of(
         attended=attended,
         silent=silent,
         last_track_s=newest.last_track_s,
+        images=newest.images,
     )
 
 
@@ -165,7 +169,7 @@ def _counting(newest: fleet.Newest, attended: Attendance, now: datetime) -> Esti
         return None  # it was measured against a pose or a reference that no longer counts
     if reference.answered_at is not None and estimate.created_at <= reference.answered_at:
         return None
-    if reference.ready_at is None:
+    if reference.ready_at is None and reference.source is not None:
         return estimate
     # Somebody was at it and has gone: it may stand elsewhere. While they are there it is not
     # judged, so what was told before stands.

@@ -38,11 +38,16 @@ def carried_state(session: Session, reference: SiteReferenceRecord) -> Assessmen
         false_alarm=reference.answer == Answer.FALSE_ALARM,
         change=_change_of(reference),
         moved_at=None if last is None else _span(last.drift_after, last.drift_since),
-        # As it was learned; or as an operator answered, which begins a window.
-        stationary_until_s=max(reference.to_s or 0.0, reference.window_from_s or 0.0),
+        stationary_until_s=_stationary_until_s(reference),
         assessed_until_s=None if last is None else last.to_s,
         doubts=tuple(reference.doubts),
     )
+
+
+def _stationary_until_s(reference: SiteReferenceRecord) -> float:
+    """The end of the reference, or the operator's answer, if no change has begun the window."""
+    answered_s = reference.window_from_s if reference.changed_s is None else None
+    return max(reference.to_s or 0.0, answered_s or 0.0)
 
 
 def _change_of(reference: SiteReferenceRecord) -> TimeSpan | None:

@@ -5,7 +5,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from models.assessment import NO_TIME, Assessment, CameraState, Decision, TimeSpan, change_of
+from models.assessment import NO_TIME, Assessment, CameraState, Decision, TimeSpan, change_in
 from models.geometry.pose import PoseParameters
 from models.monitoring.drift import LIKELY, Drift, pose_after
 from models.pose import PosePosterior
@@ -101,10 +101,10 @@ def _learning(
 def _note_change(
     reference: SiteReferenceRecord, evidence: Evidence, assessment: Assessment
 ) -> None:
-    """Begin the window at a change that was found, between two tracks."""
+    """Begin the window at a change that was found, and keep its time, if that is known."""
     at, change = (
         assessment.estimated.change_idx,
-        change_of(assessment.observed, assessment.estimated),
+        change_in(assessment.observed, assessment.estimated),
     )
     if at is not None and change is not None:
         reference.window_from_s = evidence.tracks[at].ended_s

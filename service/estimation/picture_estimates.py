@@ -1,4 +1,4 @@
-"""The estimate by a picture alone: of a camera that nobody has walked by since, or ever."""
+"""The estimate by images alone: of a camera without tracks since, or without any."""
 
 import math
 from dataclasses import asdict
@@ -9,13 +9,12 @@ from sqlalchemy.orm import Session
 from models.assessment import NO_TIME, CameraState, Decision, TimeSpan, judge, reason_of_drift
 from models.geometry.pose import PoseParameters
 from models.monitoring.drift import LIKELY, pose_after
-from models.pose import PosePosterior, posterior_by_picture
+from models.pose import PosePosterior, drift_by_images, posterior_by_picture
 from models.reasons import Reason
 from service.estimation.alert_evidence import told_by
 from service.estimation.carried_state import carried_state
 from service.estimation.estimates import record_of, tell_estimate, update_alerts
 from service.estimation.moved_zones import MovedZones, moved_zones
-from service.estimation.pictures import drift_by_picture
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.notifications.outbox import json_time
 from service.reasons import ServiceCode, some
@@ -29,7 +28,10 @@ from service.wording.times import from_seconds
 
 
 def save_by_picture(session: Session, settings: Settings, camera_id: str) -> EstimateRecord | None:
-    """Judge a camera by its newest picture; None where there is none, or it was judged already."""
+    """Judge a camera by its images; None if there is no match, or it was judged already.
+
+    While a reference is learned from tracks, images are only used to report a move.
+    """
     reference = references.newest_if_any(session, camera_id)
     if reference is None:
         return None
@@ -39,14 +41,15 @@ def save_by_picture(session: Session, settings: Settings, camera_id: str) -> Est
         return None
     prior = cameras.prior_pose(session, camera_id).pose
     posterior = posterior_by_picture(prior, picture.evidence, settings.moved_prior)
-    drift, limits = drift_by_picture(posterior), drift_limits(settings)
+    drift, limits = drift_by_images(posterior), drift_limits(settings)
     carried = carried_state(session, reference)
     drifted = carried.drifted
     if drifted and last is not None and last.reference_id == reference.id:
-        drifted = tuple(last.drifted)  # while it learns, too, by pictures alone
+        drifted = tuple(last.drifted)  # while it learns, too, by images alone
     verdict = judge(drift, limits, drifted)
-    if reference.ready_at is None and not verdict.drifting and not drifted:
-        return None  # it learns what is usual, and stands
+    learning = reference.ready_at is None and reference.source is not None
+    if learning and not verdict.drifting and not drifted:
+        return None
     state = CameraState.SUSPECTED if posterior.moved >= LIKELY else CameraState.OK
     moved_at = NO_TIME
     if verdict.drifting:

@@ -6,13 +6,14 @@ Three steps, as of an estimate: read in one transaction, computed in none, saved
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 from sqlalchemy.orm import Session
 
 from models.geometry.intrinsics import Intrinsics
-from models.geometry.pose import ANGLES, CameraPose
-from models.monitoring.drift import LIKELY, Drift, drift_between
+from models.geometry.pose import CameraPose
+from models.monitoring.drift import LIKELY
 from models.pictures import (
     Features,
     PictureFault,
@@ -26,16 +27,19 @@ from models.pictures import (
     turned_covariance,
     turned_pose,
 )
-from models.pose import PictureEvidence, PosePosterior, posterior_by_picture
+from models.pose import drift_by_images, posterior_by_picture, turn_by_pose
 from models.reasons import Reason
 from service.alerts.alerts import end_alert, open_alert
 from service.enums import AlertKind, AlertSource, Outcome, Severity
+from service.estimation.seen_picture import INDEPENDENT_S, evidence_of
 from service.reasons import ServiceCode
 from service.references import drift_limits
 from service.settings import Settings
 from service.store import alerts, cameras, pictures, references
 from service.store.cameras import CameraRecord, SnapshotRecord
 from service.store.pictures import PictureRecord, PictureReferenceRecord
+
+_MOST_EARLIER = 7  # matches kept beside the newest: with 8 that agree, their common error is most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,17 +151,21 @@ def _result(
         has_moved=None if last is None else last.has_moved,
         agreement={} if new.last is None else new.last.agreement,
         other_at=None if last is None else last.other_at,
+        inliers=None,
+        compared=(0 if last is None else last.compared) + bool(new.gallery),
+        earlier=[] if last is None else _earlier(last, digest),
     )
     if turn is None:
         return record
-    covariance = turned_covariance(new.prior, turn)
-    evidence = PictureEvidence.of_poses(new.prior, turned_pose(new.prior, turn), covariance)
-    record.offset, record.covariance = evidence.offset.tolist(), covariance.tolist()
+    record.offset = turn_by_pose(new.prior, turned_pose(new.prior, turn)).tolist()
+    record.covariance = turned_covariance(new.prior, turn).tolist()
+    record.inliers = turn.inliers
     record.zoom = float(np.exp(turn.log_zoom))
     record.zoom_sd = record.zoom * float(np.sqrt(turn.covariance[3, 3]))
+    evidence = evidence_of(record, record.earlier)
     posterior = posterior_by_picture(new.prior, evidence, new.moved_prior)
     has_moved = posterior.moved >= LIKELY
-    if has_moved and drift_by_picture(posterior).angle_rad < new.limits_rad:
+    if has_moved and drift_by_images(posterior).angle_rad < new.limits_rad:
         return record  # so little may be the light's
     if last is not None and last.has_moved is not None and last.has_moved != has_moved:
         record.other_at = last.taken_at
@@ -165,11 +173,14 @@ def _result(
     return record
 
 
-def drift_by_picture(posterior: PosePosterior) -> Drift:
-    """The drift by a picture alone: of the angles."""
-    return drift_between(
-        posterior.parameters, posterior.sd, ANGLES, posterior.prior, posterior.move
-    )
+def _earlier(last: PictureRecord, digest: str) -> list[Any]:
+    """The matches to keep beside a new image of a digest of pixels: the newest, a minute apart."""
+    if last.digest == digest:
+        return last.earlier
+    kept = last.matches
+    if len(kept) > 1 and kept[0]["taken_s"] - kept[1]["taken_s"] < INDEPENDENT_S:
+        return last.earlier
+    return kept[:_MOST_EARLIER]
 
 
 def save_picture(

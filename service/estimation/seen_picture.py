@@ -1,6 +1,7 @@
-"""What the newest picture says for an estimate, and when a camera is asked for another."""
+"""The newest image for an estimate, and when a camera is asked for another."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -8,12 +9,12 @@ from typing import Any
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.geometry.pose import ANGLES
-from models.pose import PictureEvidence
+from models.pose import PictureEvidence, of_agreeing
 from models.reasons import Reason
 from service.enums import PoseState
 from service.reasons import ServiceCode
 from service.references import is_before
+from service.store import pictures
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
 from service.store.pictures import PictureRecord
@@ -23,13 +24,15 @@ from service.store.windows import WindowBounds
 _LATER = 0.25  # of the people: so many may have come after a picture that counts beside them
 _DOUBTS = (PoseState.SUSPECTED, PoseState.UNSURE, PoseState.DRIFTING)
 _AGAIN = timedelta(minutes=1)
+INDEPENDENT_S = 60.0  # between images: a guess at how long a lorry waits before a camera
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenPicture:
-    """What the newest picture says for an estimate: of a time, in seconds since the epoch.
+    """The newest image for an estimate, of a time in seconds since the epoch.
 
-    `raw` is what is told of it, `evidence` None where it matched none of the gallery.
+    `raw` is as in `estimates.picture`; `evidence` is by the image and earlier ones that agree with
+    it, and None if it matched none of the gallery.
     """
 
     taken_s: float
@@ -71,39 +74,49 @@ def ask_in_doubt(session: Session, record: EstimateRecord, picture: SeenPicture 
 def seen_picture(
     session: Session, reference: SiteReferenceRecord, bounds: WindowBounds
 ) -> SeenPicture | None:
-    """The newest picture that was compared, where it is of now: within the bounds of the window.
+    """The newest image that was compared, and those that agree with it, within a window's bounds.
 
-    None where it is of before a reference, an answer or a change, or somebody was at the camera.
+    None if it was taken before a reference, an answer or a change, or during maintenance.
     """
-    record = session.get(PictureRecord, reference.camera_id)
-    if record is None or record.prior_pose_id != reference.prior_pose_id:
+    record = pictures.compared(session, reference.camera_id, reference.prior_pose_id)
+    if record is None:
         return None
-    if reference.answered_at is not None and record.stored_at <= reference.answered_at:
+    answered_at = reference.answered_at
+    if answered_at is not None and record.stored_at <= answered_at:
         return None
-    # One that comes again, to the last pixel, is of when it was first seen: a camera's pictures
-    # freeze, and would say for ever that it stands.
+    answered_s = -math.inf if answered_at is None else answered_at.timestamp()
+
+    def counts(taken_s: float) -> bool:
+        attended = any(from_s <= taken_s < to_s for from_s, to_s in bounds.without)
+        return not attended and not is_before(taken_s, bounds)
+
     taken_s = record.same_since.timestamp()
-    attended = any(from_s <= taken_s < to_s for from_s, to_s in bounds.without)
-    if attended or is_before(taken_s, bounds):
+    if not counts(taken_s):
         return None
-    evidence = None
-    if record.offset is not None and record.covariance is not None:
-        evidence = PictureEvidence(
-            offset=np.array(record.offset), covariance=np.array(record.covariance)
-        )
-    return SeenPicture(taken_s=taken_s, evidence=evidence, raw=_raw(record))
+    earlier = [
+        each for each in record.earlier if each["taken_s"] > answered_s and counts(each["taken_s"])
+    ]
+    return SeenPicture(
+        taken_s=taken_s,
+        evidence=None if record.offset is None else evidence_of(record, earlier),
+        raw=record.as_estimate,
+    )
 
 
-def _raw(record: PictureRecord) -> dict[str, Any]:
-    found: dict[str, Any] = {
-        "taken_at": record.same_since.isoformat(),
-        "matched": record.offset is not None,
-    }
-    if record.offset is not None and record.covariance is not None:
-        sd = np.sqrt(np.diag(np.array(record.covariance))).tolist()
-        names = [f"{name}_rad" for name in ANGLES]
-        found |= dict(zip(names, record.offset, strict=True))
-        found["zoom"] = record.zoom
-        found["shifted"] = record.shifted
-        found["sd"] = dict(zip(names, sd, strict=True)) | {"zoom": record.zoom_sd}
-    return found
+def evidence_of(record: PictureRecord, earlier: Sequence[Mapping[str, Any]]) -> PictureEvidence:
+    """The evidence of an image that matched, and of earlier matches, the newest first.
+
+    Images less than a minute after one another share their lorry: one of them counts.
+    """
+    matches = record.matches[:1]
+    for each in earlier:
+        if matches[-1]["taken_s"] - each["taken_s"] >= INDEPENDENT_S:
+            matches.append(dict(each))
+    return of_agreeing(
+        [
+            PictureEvidence.of_match(
+                np.array(each["offset"]), np.array(each["covariance"]), each["inliers"]
+            )
+            for each in matches
+        ]
+    )

@@ -33,6 +33,7 @@ from service.store.alerts import AlertRecord
 from service.store.cameras import CameraRecord, PriorPoseRecord, RhythmRecord, newest_of
 from service.store.engines.dialects import as_json, contains_word, largest
 from service.store.estimates import EstimateRecord
+from service.store.pictures import PictureRecord
 from service.store.references import MaintenanceRecord, SiteReferenceRecord
 from service.store.tracks import Spans, TrackRecord
 from service.store.trainings import UNFINISHED, TrainingRecord
@@ -51,7 +52,7 @@ class Newest:
     without what is behind it. `last_track_s` is when the newest track ended of those that count,
     `usual_gap_s` and `delay_s` are of the arrival model, if there is one. `fires` says that an
     alert does, `attended` that there are maintenance windows, `assumed` that nobody has agreed to
-    its prior pose.
+    its prior pose. `images` counts those that were compared with that pose's first.
     """
 
     reference: SiteReferenceRecord
@@ -62,6 +63,7 @@ class Newest:
     fires: bool
     attended: bool
     assumed: bool
+    images: int
 
 
 def newest(session: Session, ids: Ids = None, *, lean: bool = False) -> dict[str, Newest]:
@@ -80,10 +82,20 @@ def newest(session: Session, ids: Ids = None, *, lean: bool = False) -> dict[str
             fires=bool(fires),
             attended=bool(attended),
             assumed=origin == Origin.ASSUMED,
+            images=images or 0,
         )
-        for camera_id, reference, estimate, ended_s, gap_s, delay_s, fires, attended, origin in (
-            session.execute(query, given(ids))
-        )
+        for (
+            camera_id,
+            reference,
+            estimate,
+            ended_s,
+            gap_s,
+            delay_s,
+            fires,
+            attended,
+            origin,
+            images,
+        ) in session.execute(query, given(ids))
     }
 
 
@@ -166,12 +178,18 @@ def _newest(*, some: bool, whole: bool, lean: bool) -> Select[Any]:
             fires.correlate(CameraRecord),
             attended.correlate(CameraRecord),
             PriorPoseRecord.origin,
+            PictureRecord.compared,
         )
         .select_from(CameraRecord)
         .join(SiteReferenceRecord, SiteReferenceRecord.id == reference)
         .join(PriorPoseRecord, PriorPoseRecord.id == SiteReferenceRecord.prior_pose_id)
         .outerjoin(EstimateRecord, EstimateRecord.id == estimate)
         .outerjoin(RhythmRecord, RhythmRecord.camera_id == CameraRecord.id)
+        .outerjoin(
+            PictureRecord,
+            (PictureRecord.camera_id == CameraRecord.id)
+            & (PictureRecord.prior_pose_id == PriorPoseRecord.id),
+        )
         .where(among_given(CameraRecord.id, some=some))
         .order_by(CameraRecord.id)
     )

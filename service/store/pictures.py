@@ -5,9 +5,11 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
+import numpy as np
 from sqlalchemy import JSON, ForeignKey, Index, LargeBinary, String, delete, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
+from models.geometry.pose import ANGLES
 from service.store.record import Record, camera_key, foreign_key
 
 
@@ -28,17 +30,19 @@ class PictureReferenceRecord(Record):
 
 
 class PictureRecord(Record):
-    """The result of a camera's newest picture, against the gallery of its prior pose.
+    """The result of a camera's newest image, against the gallery of its prior pose.
 
-    `offset` is how far it has turned from that, in tilt, roll and heading, with the covariance of
-    the three; None where it matched none of the gallery, and `has_moved` is of the last that did.
-    `shifted` says that it was moved aside, too. `digest` is of its pixels, which were the same
-    since `same_since`. `other_at` is when the newest picture was taken by which it was the other
-    way round: stood, or had moved.
-    `agreement` counts pictures by what they say and people say beside them: `stood/moved` are those
-    of a camera that stood by the picture and moved by people. `unmatched` are features of a picture
-    since the last one that matched, with which it stood. `stood_jpeg` is the newest picture by
-    which it stood, where pictures are kept.
+    `offset` is the turn since that pose in tilt, roll and heading, with the covariance of the three
+    and the `inliers` of the match; None if it matched no reference. `earlier` has the same of the
+    images before it that matched, each with `taken_s`, the newest first. `compared` counts all
+    images since the first of the gallery, whether or not they matched.
+    `has_moved` is by the last image that matched. `shifted`: the camera was moved aside, too.
+    `digest` is of the pixels, which have been the same since `same_since`. `other_at` is when the
+    newest image was taken by which `has_moved` was the other way round.
+    `agreement` counts images by what they and the tracks beside them indicate: `stood/moved` are
+    those of a camera that had not moved by the image, and had by its tracks. `unmatched` are
+    features of an image since the last one that matched, and by which the camera had not moved.
+    `stood_jpeg` is the newest image by which it had not moved, if images are kept.
     """
 
     __tablename__ = "pictures"
@@ -62,11 +66,55 @@ class PictureRecord(Record):
     unmatched: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     stood_jpeg: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     stood_at: Mapped[datetime | None]
+    inliers: Mapped[int | None]
+    compared: Mapped[int] = mapped_column(default=0)
+    earlier: Mapped[list[Any]] = mapped_column(JSON, default=list)
 
     @property
     def unchanged_s(self) -> float:
-        """For how long all pictures have been this one, to the last pixel."""
+        """How long all images have been this one, to the last pixel."""
         return (self.taken_at - self.same_since).total_seconds()
+
+    @property
+    def matches(self) -> list[dict[str, Any]]:
+        """This image's match, if there is one, and those of earlier images, the newest first.
+
+        An image that comes again is of when it was first received: cameras freeze.
+        """
+        if self.offset is None:
+            return self.earlier
+        own = {
+            "taken_s": self.same_since.timestamp(),
+            "offset": self.offset,
+            "covariance": self.covariance,
+            "inliers": self.inliers,
+        }
+        return [own, *self.earlier]
+
+    @property
+    def as_estimate(self) -> dict[str, Any]:
+        """The turn by this image alone, as `estimates.picture`; angles in radians."""
+        names = [f"{name}_rad" for name in ANGLES]
+        found: dict[str, Any] = {
+            "taken_at": self.same_since.isoformat(),
+            "matched": self.offset is not None,
+            "compared": self.compared,
+            **dict.fromkeys((*names, "zoom", "sd", "shifted", "inliers")),
+        }
+        if self.offset is not None and self.covariance is not None:
+            sd = np.sqrt(np.diag(np.array(self.covariance))).tolist()
+            found |= dict(zip(names, self.offset, strict=True))
+            found |= {"zoom": self.zoom, "shifted": self.shifted, "inliers": self.inliers}
+            found["sd"] = dict(zip(names, sd, strict=True)) | {"zoom": self.zoom_sd}
+        return found
+
+
+def compared(session: Session, camera_id: str, prior_pose_id: int) -> PictureRecord | None:
+    """The result of the newest image against a prior pose; None until one was compared."""
+    record = session.get(PictureRecord, camera_id)
+    if record is None or record.prior_pose_id != prior_pose_id or not record.compared:
+        return None
+    return record
 
 
 def gallery(session: Session, prior_pose_id: int) -> Sequence[PictureReferenceRecord]:

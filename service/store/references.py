@@ -43,9 +43,9 @@ class SiteReferenceRecord(Record):
     where none is said. `to_s` is when the last of them ended, `data` the site (`models.walking`).
     As of the last look, `pieces` of its tracks go on others' walks, and they ended in so many
     different `hours` of date and time (UTC).
-    Later, `window_from_s` is when the first track after the newest change of the camera ended, and
-    `changed_s` when it started. `answer` is what a person said last of how the camera stands:
-    estimates of before `answered_at` say nothing of it any more.
+    Later, `window_from_s` is when the first track after the newest change of the camera ended. That
+    change was before `changed_s` and, if its time is known, after `changed_after_s`. `answer` is a
+    person's last one about the position: estimates from before `answered_at` no longer count.
     """
 
     __tablename__ = "site_references"

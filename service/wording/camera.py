@@ -116,11 +116,21 @@ def _status_words(camera: CameraFacts, clock: Clock) -> str:
         share = f"{100 * estimate.moved:.0f} %"
         if not how:
             return _("It may have moved ({share}). The next people will tell.", share=share)
+        if not estimate.tracks:
+            return _(
+                "It may have moved ({share}): it {how}. Another image or more tracks will show.",
+                share=share,
+                how=how,
+            )
         return _(
             "It may have moved ({share}): it {how}. The next people will tell.",
             share=share,
             how=how,
         )
+    if not estimate.tracks:
+        at = clock.when(clock.of(estimate.to_s))
+        sure = sure_words(estimate)
+        return _("In its original position, by the image of {time}{sure}.", time=at, sure=sure)
     return _(
         "Standing where it should, as {n} people of the last {time} show{sure}.",
         n=estimate.tracks,

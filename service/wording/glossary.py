@@ -38,7 +38,7 @@ WORDS = {
             "Nobody has said how high it hangs and where it looks. The people before it tell,"
             " and somebody has to agree to that."
         ),
-        N_("Unconnected"): N_("Nobody has ever sent a person's track for it."),
+        N_("Unconnected"): N_("No track was ever posted for it, and no image was compared."),
     },
     N_("How a camera stands"): {
         N_("Tilt"): N_("How far it looks down; 0° looks at the horizon."),

@@ -380,8 +380,13 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     ServiceCode.WITHOUT_PART: lambda v: _(
         "without the {part}: {why}", part=v["part"].replace("_", " "), why=v["why"]
     ),
+    ServiceCode.AWAITING_IMAGE: lambda v: _n(
+        "{n} image was compared; the next that matches shows where the camera is",
+        "{n} images were compared; the next that matches shows where the camera is",
+        int(v["compared"]),
+    ),
     ServiceCode.BY_PICTURE: lambda v: _(
-        "by a picture of {taken_at}, nobody having walked by since",
+        "estimated from the image of {taken_at}, without tracks since",
         taken_at=_clock(v["taken_at"], v["zone"]),
     ),
     TracksCode.SITE_CHANGED: N_(

@@ -2,8 +2,8 @@
 
 `python -m studies pictures FOLDER ...`: photographs are turned by what is known, in all weathers,
 and pictures of one pose are compared with one another; trials that `--output` has are not made
-again. With `--before` and `--after`, pictures of a real camera that moved; with `--cost`, the CPU
-time of a comparison alone.
+again. With `--before` and `--after`, pictures of a real camera that moved, and the same turned by
+0 to 5 deg; with `--cost`, the CPU time of a comparison alone.
 """
 
 import argparse
@@ -25,7 +25,14 @@ from models.pictures.measures import Pixels
 from models.pictures.turn import Turn, turn_between
 from studies.lines_file import LinesFile
 from studies.pages import markers, write_between
-from studies.pictures.tables import cost_line, pairs_table, real_table, turns_table
+from studies.pictures.moves import MoveTrial, move_trials
+from studies.pictures.tables import (
+    cost_line,
+    moves_table,
+    pairs_table,
+    real_table,
+    turns_table,
+)
 from studies.pictures.trials import (
     PairTrial,
     TurnTrial,
@@ -49,17 +56,18 @@ def main(arguments: Sequence[str]) -> None:
     """Run what is asked for, and print or write its tables."""
     asked = _parser().parse_args(arguments)
     cv2.setNumThreads(1)
-    parts = []
-    if asked.folders and not asked.cost:
-        parts += _of_photographs(asked)
-    if asked.before and asked.after:
-        parts.append(real_table(*_real(asked.before, asked.after, asked.focal_px)))
+    texts: dict[str, list[str]] = {}
     if asked.folders:
-        parts.append(cost_line(*_cost(photographs(asked.folders))))
-    text = "\n".join(parts)
-    Console().print(text, markup=False, highlight=False, soft_wrap=True)
-    if asked.write:
-        write_between(asked.write, markers("pictures", COMMAND), text)
+        made = [] if asked.cost else _of_photographs(asked)
+        texts["pictures"] = [*made, cost_line(*_cost(photographs(asked.folders)))]
+    if asked.before and asked.after:
+        real = real_table(*_real(asked.before, asked.after, asked.focal_px))
+        texts["real pictures"] = [real, moves_table(_moves(asked))]
+    for name, parts in texts.items():
+        text = "\n".join(parts)
+        Console().print(text, markup=False, highlight=False, soft_wrap=True)
+        if asked.write:
+            write_between(asked.write, markers(name, COMMAND), text)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -70,6 +78,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--before", nargs="*", type=Path, help="pictures of a real camera")
     parser.add_argument("--after", nargs="*", type=Path, help="and of it after it moved")
+    parser.add_argument(
+        "--moves", type=int, default=12, help="rounds of small known turns of these"
+    )
     parser.add_argument("--focal-px", type=float, default=lens().fx, help="of that camera")
     parser.add_argument("--cost", action="store_true", help="the CPU time alone")
     parser.add_argument("--output", type=Path, default=Path("pictures.jsonl"), help="kept trials")
@@ -94,7 +105,7 @@ def _of_photographs(asked: argparse.Namespace) -> list[str]:
         },
     }
     kept = LinesFile(asked.output)
-    done = {str(row["task"]): row for row in kept.rows}
+    done = {str(row["task"]): row for row in kept.rows if "task" in row}
     missing = [name for name in tasks if name not in done]
     with process_pool(asked.processes) as pool:
         for number, row in as_they_end(pool, [tasks[name] for name in missing]):
@@ -134,6 +145,19 @@ def _pairs(folders: Sequence[Path], name: str, seed: int) -> dict[str, Any]:
         part: [None if trial is None else asdict(trial) for trial in trials]
         for part, trials in (("still", still), ("others", others))
     }
+
+
+def _moves(asked: argparse.Namespace) -> list[MoveTrial]:
+    """Trials of small known turns in real images of other hours; those that are kept stay."""
+    kept = LinesFile(asked.output)
+    done = [row for row in kept.rows if "moves" in row]
+    missing = range(len(done), asked.moves)
+    make = partial(move_trials, asked.before, asked.after, asked.focal_px)
+    with process_pool(asked.processes) as pool:
+        for _, trials in as_they_end(pool, [partial(make, number) for number in missing]):
+            done.append({"moves": [asdict(trial) for trial in trials]})
+            kept.add(done[-1:])
+    return [MoveTrial(**each) for row in done[: asked.moves] for each in row["moves"]]
 
 
 def _real(

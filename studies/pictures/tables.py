@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from models.pictures.turn import Turn
-from studies.pictures.trials import PairTrial, TurnTrial
+from studies.pictures.moves import NO_TURN, TURNS, Light, MoveTrial
+from studies.pictures.trials import PairTrial, TurnTrial, moved_by
 
 _INSIDE = 1.645  # sd, of 90 %
 _CERTAIN = 0.99  # `DriftLimits.certainty`
@@ -61,12 +62,13 @@ def _bound(count: int, of: int) -> str:
 def real_table(found: Sequence[tuple[str, str, Turn | None]], focal_px: float) -> str:
     """Turns of a real camera: in degrees, and the shift of its view's middle in pixels."""
     lines = [
-        "| Before | After | Right | Down | Clockwise | sd | Middle moves by (px) | Inliers |",
-        "|---|---|---|---|---|---|---|---|",
+        "| Before | After | Right | Down | Clockwise | sd | Middle moves by (px) | Inliers "
+        "| `moved` |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for before, after, turn in found:
         if turn is None:
-            lines.append(f"| {before} | {after} | no match | | | | | |")
+            lines.append(f"| {before} | {after} | no match | | | | | | |")
             continue
         right, down, clockwise = turn.aim
         shift = [-focal_px * math.tan(angle) for angle in (right, down)]
@@ -74,8 +76,31 @@ def real_table(found: Sequence[tuple[str, str, Turn | None]], focal_px: float) -
         lines.append(
             f"| {before} | {after} | {math.degrees(right):+.2f}° | {math.degrees(down):+.2f}° "
             f"| {math.degrees(clockwise):+.2f}° | {sds.max():.2f}° "
-            f"| {shift[0]:+.1f}, {shift[1]:+.1f} | {turn.inliers}{' shifted' * turn.shifted} |"
+            f"| {shift[0]:+.1f}, {shift[1]:+.1f} | {turn.inliers}{' shifted' * turn.shifted} "
+            f"| {moved_by(turn):.4f} |"
         )
+    return "\n".join(lines) + "\n"
+
+
+def moves_table(trials: Sequence[MoveTrial]) -> str:
+    """Small turns: how many are reported by one image and by three."""
+    lines = [
+        "| Light | Turn | Angles | Trials | Inliers | `moved`, one | Alerts, one | `moved`, three "
+        "| Alerts, three |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for light in Light:
+        for size, angles in (*TURNS, NO_TURN):
+            own = [t for t in trials if (t.light, t.size_deg, t.angles) == (light, size, angles)]
+            if not own:
+                continue
+            inliers = np.median([t.inliers for t in own if t.inliers] or [0])
+            one, three = (np.array([getattr(t, name) for t in own]) for name in ("one", "three"))
+            alarms = [sum(getattr(t, name) for t in own) for name in ("one_alerts", "three_alert")]
+            lines.append(
+                f"| {light.value} | {size:g}° | {angles or 'none'} | {len(own)} | {inliers:.0f} "
+                f"| {np.median(one):.4f} | {alarms[0]} | {np.median(three):.4f} | {alarms[1]} |"
+            )
     return "\n".join(lines) + "\n"
 
 

@@ -13,7 +13,7 @@ from models.geometry.rotation import Array
 from models.pictures.features import Features, describe
 from models.pictures.measures import Pixels
 from models.pictures.turn import Turn, turn_between, turned_covariance, turned_pose
-from models.pose import PictureEvidence, posterior_by_picture
+from models.pose import PictureEvidence, posterior_by_picture, turn_by_pose
 from studies.pictures.weather import SIZE, drawn, fitted_to_view, lens, taken, turned
 
 LARGEST_RAD = math.radians(25.0)
@@ -129,9 +129,13 @@ class PairTrial:
 
 def moved_by(turn: Turn, prior: CameraPose = PRIOR) -> float:
     """The probability that a camera moved, by one picture alone."""
-    after = turned_pose(prior, turn)
-    seen = PictureEvidence.of_poses(prior, after, turned_covariance(prior, turn))
-    return posterior_by_picture(prior, seen).moved
+    return posterior_by_picture(prior, evidence_of(turn, prior)).moved
+
+
+def evidence_of(turn: Turn, prior: CameraPose = PRIOR) -> PictureEvidence:
+    """The evidence of a turn on the camera's pose."""
+    offset = turn_by_pose(prior, turned_pose(prior, turn))
+    return PictureEvidence.of_match(offset, turned_covariance(prior, turn), turn.inliers)
 
 
 def pair_trials(

@@ -15,8 +15,10 @@ from models.pose import (
     PoseFinding,
     config,
     drift_of,
+    of_agreeing,
     pose_posterior,
     posterior_by_picture,
+    turn_by_pose,
     with_picture,
 )
 from models.reasons import Reason, TracksCode
@@ -26,7 +28,17 @@ from tests.models.test_hypotheses import PRIOR, estimate
 def picture(tilt=0.0, roll=0.0, heading=0.0, sd=0.03):
     """A picture of a camera that turned by so many degrees."""
     return PictureEvidence(
-        offset=np.radians([tilt, roll, heading]), covariance=np.eye(3) * math.radians(sd) ** 2
+        offset=np.radians([tilt, roll, heading]),
+        covariance=np.eye(3) * math.radians(sd) ** 2,
+        freedom=5.0,
+        wrong=1e-4,
+    )
+
+
+def image(tilt=0.0, roll=0.0, heading=0.0, *, sd, inliers):
+    """The evidence of an image that matched with so many inliers."""
+    return PictureEvidence.of_match(
+        np.radians([tilt, roll, heading]), np.eye(3) * math.radians(sd) ** 2, inliers
     )
 
 
@@ -37,16 +49,73 @@ def people(**by):
 def test_a_turn_is_the_angles_after_less_those_before_the_short_way_round():
     prior = replace(PRIOR, heading_rad=3.1)
     after = replace(prior, tilt_rad=0.5, roll_rad=-0.03, heading_rad=-3.1)
-    found = PictureEvidence.of_poses(prior, after, np.eye(3))
-    assert_allclose(found.offset, [0.1, -0.05, 2 * math.pi - 6.2])
+    assert_allclose(turn_by_pose(prior, after), [0.1, -0.05, 2 * math.pi - 6.2])
 
 
 def test_what_is_no_evidence_is_refused():
     with pytest.raises(ShapeError, match="offset"):
-        PictureEvidence(offset=np.array([0.0, 0.0, np.nan]), covariance=np.eye(3))
+        replace(picture(), offset=np.array([0.0, 0.0, np.nan]))
     for wrong in (np.zeros((3, 3)), np.eye(2), np.diag([1.0, 1.0, -1.0])):
         with pytest.raises(ShapeError, match="covariance"):
-            PictureEvidence(offset=np.zeros(3), covariance=wrong)
+            replace(picture(), covariance=wrong)
+    with pytest.raises(ShapeError, match="freedom"):
+        replace(picture(), freedom=2.0)
+    with pytest.raises(ShapeError, match="wrong"):
+        replace(picture(), wrong=1.1)
+
+
+def test_inliers_determine_tails_and_the_chance_of_a_wrong_match():
+    """Freedom 4 + n / 20; wrong 1e-4 + 1e-3 of 8 inliers, a tenth of that in each 4 more."""
+    few, some, many = (image(sd=0.1, inliers=n) for n in (8, 12, 370))
+    assert [each.freedom for each in (few, some, many)] == pytest.approx([4.4, 4.6, 22.5])
+    assert [each.wrong for each in (few, some, many)] == pytest.approx([1.1e-3, 2e-4, 1e-4])
+
+
+@pytest.mark.parametrize(
+    "turn", [(0.8, 0.7, 0.8), (1.3, 0, 0), (1.5, 0.7, 0), (0, 0.9, 0.9), (1.2, 1.2, 1.2)]
+)
+def test_one_image_of_many_inliers_is_certain_of_a_turn_of_1_3_deg(turn):
+    assert posterior_by_picture(PRIOR, image(*turn, sd=0.025, inliers=370)).moved > 0.999
+
+
+def test_images_that_agree_add_up():
+    """With 25 inliers, as across a change of light, one image is not certain and three are."""
+    seen = image(1.5, 0.7, sd=0.12, inliers=25)
+    assert posterior_by_picture(PRIOR, seen).moved < 0.95
+    assert posterior_by_picture(PRIOR, of_agreeing([seen] * 3)).moved > 0.999
+    still = image(0.05, 0.05, sd=0.12, inliers=25)
+    assert posterior_by_picture(PRIOR, of_agreeing([still] * 8)).moved < 0.05
+
+
+def test_agreeing_images_have_a_common_error_and_a_common_chance_to_be_wrong():
+    """With n images of covariance C: C / 4 + 3 C / 4 n, and wrong 1e-5 + w^n, w = 1.02e-4."""
+    one = image(1.0, sd=0.1, inliers=15)
+    four = of_agreeing([one] * 4)
+    assert_allclose(four.offset, one.offset)
+    assert_allclose(four.covariance, one.covariance * (0.25 + 0.75 / 4))
+    assert four.freedom == pytest.approx(4 * one.freedom)
+    assert four.wrong == pytest.approx(1e-5, rel=1e-3)
+
+
+def test_images_of_before_a_move_do_not_dilute_it():
+    """The newest that agree count; one of before the move ends them, whatever came before it."""
+    after, before = (image(tilt, sd=0.1, inliers=100) for tilt in (2.0, 0.0))
+    found = of_agreeing([after, after, before, after])
+    assert_allclose(found.offset, after.offset)
+    assert found.freedom == pytest.approx(2 * after.freedom)
+    alone = of_agreeing([after, before, before])
+    assert alone is after
+
+
+def test_probabilities_do_not_exceed_one():
+    """Rounding made it 1.0000000000000002."""
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        seen = image(*rng.normal(0, 5, 3), sd=0.03, inliers=300)
+        found = posterior_by_picture(PRIOR, seen)
+        assert 0 <= found.moved <= 1
+        assert all(0 <= share <= 1 for share in found.move.parameters.values())
+        assert found.turned <= 1
 
 
 def test_the_density_is_a_student_t_of_the_turn():

@@ -9,7 +9,7 @@ import numpy as np
 from models.assessment import TrackWindow, conclude
 from models.assessment.observe import observe_window
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose
-from models.pose import PoseFinding, smallest_told
+from models.pose import MovedBetween, PoseFinding, smallest_told
 from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.reasons import Reason, TracksCode
 from models.regression.recipe import plan_to_config
@@ -104,10 +104,12 @@ def made_up(
     paths=False,
     changed=False,
     causes=None,
+    timed=True,
 ) -> ComputedEstimate:
     """What the tracks of a window come to: a pose, whose heading is identifiable by their `paths`.
 
-    Where these have `changed`, people walk on none of them.
+    Where these have `changed`, people walk on none of them. Unless `timed`, too few came after a
+    move to know when it was.
     """
     values = np.array([pose.tilt_rad, pose.roll_rad, math.log(pose.height_m)])
     missing = f"the tracks cannot tell {' and '.join(unidentifiable)}"
@@ -136,7 +138,13 @@ def made_up(
         )
     if changed:
         fused = replace(fused, reason=Reason(code=TracksCode.PATHS_CHANGED))
-    found = PoseFinding(prior=evidence.prior, joint=joint, fused=fused, change_idx=change, first=0)
+    found = PoseFinding(
+        prior=evidence.prior,
+        joint=joint,
+        fused=fused,
+        change_idx=change,
+        between=MovedBetween(first=change or 0, last=change or 0) if timed else None,
+    )
     if causes is not None:
         vars(found)["causes"] = causes  # instead of those that the tracks would come to
     tracks = evidence.tracks

@@ -66,6 +66,19 @@ def drifting(now, drifted=()):
     return judge(now, LIMITS, drifted).drifting
 
 
+def test_the_floor_of_an_angle_is_one_of_the_whole_turn():
+    """1.3 deg in each of two angles are 1.8 deg, below the floor of 2 deg; 1.6 deg are 2.3."""
+    below, beyond = drift(tilt_deg=1.3, roll_deg=1.3), drift(tilt_deg=1.6, roll_deg=-1.5)
+    assert math.degrees(beyond.angle_rad) == pytest.approx(math.hypot(1.6, 1.5), abs=0.01)
+    assert not drifting(below)
+    verdict = judge(beyond, LIMITS, ())
+    assert verdict.drifted == ("tilt",)
+    assert verdict.excess == pytest.approx(math.hypot(1.6, 1.5) / 2, abs=0.01)
+    # It ends below 0.7 of the floor, by the whole turn again: 1.0 deg in both are 1.41.
+    assert drifting(drift(tilt_deg=1.0, roll_deg=1.0), ("tilt",))
+    assert not drifting(drift(tilt_deg=0.95, roll_deg=0.95), ("tilt",))
+
+
 def test_drift_is_signed_and_roll_goes_round():
     values = np.array([0.3, math.radians(-178), math.log(5.0), 1.0])
     sd = PoseParameters.sd_of_array(np.eye(4) * 1e-6, 5.0)

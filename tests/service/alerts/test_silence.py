@@ -65,8 +65,8 @@ def test_a_later_silence_replaces_the_first_and_null_ends_it(drifting):
     [
         (in_hours(-0.1), "a time after now"),
         (in_hours(30 * 24 + 1), "at most 30 days"),
-        ("2030-01-01T00:00:00", "timezone"),
-        ("soon", "datetime"),
+        ("2030-01-01T00:00:00", "with a zone"),
+        ("soon", "RFC 3339"),
     ],
     ids=["past", "far", "naive", "words"],  # a time of now in a name differs between processes
 )

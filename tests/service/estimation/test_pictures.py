@@ -72,7 +72,9 @@ def test_a_knock_is_told_by_one_picture_with_nobody_in_sight(http):
     take(http, before_s=7200)
     assert street.look()["state"] == "unconnected"
     take(http, before_s=3600, gain=0.8)
-    assert street.look()["state"] == "unconnected"
+    still = street.look()
+    assert (still["state"], still["reason_code"]) == ("ok", "by_picture")
+    assert still["estimates"]["picture"]["tilt_deg"] == pytest.approx(0.0, abs=0.05)
     assert street.alerts() == []
     take(http, TURNED)
     found = street.look()
@@ -93,8 +95,89 @@ def test_a_knock_is_told_by_one_picture_with_nobody_in_sight(http):
     assert seen["zoom"] == pytest.approx(1.0, abs=0.005)
     # And one more tells that it was put back.
     take(http)
-    street.look()
+    assert street.look()["state"] == "ok"
     assert [each["state"] for each in street.alerts()] == ["resolved"]
+
+
+def turned_by(tilt, roll, heading):
+    """The prior pose, turned by so many degrees."""
+    return replace(
+        PRIOR,
+        tilt_rad=PRIOR.tilt_rad + radians(tilt),
+        roll_rad=PRIOR.roll_rad + radians(roll),
+        heading_rad=PRIOR.heading_rad + radians(heading),
+    )
+
+
+def test_three_images_of_a_turn_of_1_3_deg_in_three_angles_open_an_alert(http):
+    """Each angle is below the floor of 1 deg, and the whole turn is beyond it."""
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street = Street(http, http.settings)
+    states, compared, after = [], [], turned_by(0.75, 0.5, 0.75)
+    for hours, pose in enumerate([PRIOR, PRIOR, after, after, after]):
+        take(http, pose, before_s=3600 * (5 - hours), gain=1 - 0.05 * hours)
+        found = street.look()
+        states.append(found["state"])
+        compared.append(found["estimates"].get("picture", {}).get("compared"))
+    assert states == ["unconnected", "ok", "drifting", "drifting", "drifting"]
+    assert compared == [None, 1, 2, 3, 4]
+    seen = found["estimates"]["picture"]
+    turn = [seen[name] for name in ("tilt_deg", "roll_deg", "heading_deg")]
+    assert turn == pytest.approx([0.75, 0.5, 0.75], abs=0.06)
+    assert (seen["matched"], seen["inliers"] > 100) == (True, True)
+    (alert,) = street.alerts()
+    assert (alert["kind"], alert["state"]) == ("drift", "firing")
+    assert alert["drift"]["angle_deg"] == pytest.approx(1.29, abs=0.05)
+    assert found["moved"] > 0.9999
+    with street.context.store.read() as session:
+        matches = session.get_one(PictureRecord, "corner").matches
+    assert len(matches) == 4
+    assert matches[0]["taken_s"] > matches[3]["taken_s"]
+
+
+def test_images_of_a_camera_that_did_not_move_open_no_alert(http):
+    """Another light, noise and a shift of 0.2 px; then an image of another scene."""
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street, scene = Street(http, http.settings), SCENE.astype(np.float32)
+    shifted = cv2.warpAffine(
+        scene, np.float32([[1, 0, 0.2], [0, 1, 0.2]]), scene.shape[::-1], flags=cv2.INTER_CUBIC
+    )
+    blurred = cv2.GaussianBlur(scene, (0, 0), 1.5)
+    for hours, grey in enumerate([scene, shifted, blurred, 0.6 * scene, 30 + 0.8 * scene]):
+        take(http, before_s=3600 * (9 - hours), grey=grey)
+        found = street.look()
+    assert (found["state"], street.alerts()) == ("ok", [])
+    assert found["moved"] < 0.05
+    take(http, before_s=60, grey=wall(1, LENS))
+    found = street.look()
+    assert found["estimates"]["picture"] | {"taken_at": None} == dict.fromkeys(
+        ("taken_at", "tilt_deg", "roll_deg", "heading_deg", "zoom", "sd", "shifted", "inliers")
+    ) | {"matched": False, "compared": 5}
+    assert found["state"] == "ok"  # no match is no evidence
+    assert [each["kind"] for each in street.alerts() if each["kind"] != "picture"] == []
+
+
+def test_images_that_never_match_are_reported(http):
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street = Street(http, http.settings)
+    take(http, before_s=7200)
+    street.look()
+    take(http, before_s=3600, grey=wall(1, LENS))
+    found = street.look()
+    assert (found["state"], found["reason_code"]) == ("learning", "awaiting_image")
+    assert found["reason"].startswith("1 image was compared")
+
+
+def test_images_within_a_minute_count_once(http):
+    http.post("/cameras", json=CAMERA).raise_for_status()
+    street = Street(http, http.settings)
+    for before_s in (300, 200, 190, 180, 60):
+        take(http, before_s=before_s)
+        street.look()
+    with street.context.store.read() as session:
+        record = session.get_one(PictureRecord, "corner")
+        ages = [record.matches[0]["taken_s"] - each["taken_s"] for each in record.matches]
+    assert ages == pytest.approx([0, 140], abs=30)
 
 
 def test_a_picture_tells_a_knock_before_people_do_and_since_when(http):

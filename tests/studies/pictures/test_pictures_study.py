@@ -1,15 +1,19 @@
 """What the study of pictures does to a photograph, and what its tables say of trials."""
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
+from models.geometry.pose import pose_from_centre
 from models.pictures.features import describe
 from models.pictures.turn import turn_between
-from studies.pictures.tables import pairs_table, turns_table
-from studies.pictures.trials import PairTrial, TurnTrial, moved_by, shared_of
+from models.pose import turn_by_pose
+from studies.pictures.moves import MoveTrial, known_turn
+from studies.pictures.tables import moves_table, pairs_table, turns_table
+from studies.pictures.trials import PRIOR, PairTrial, TurnTrial, moved_by, shared_of
 from studies.pictures.weather import SIZE, Weather, lens, taken, turned
 from tests.models.pictures.given import wall
 
@@ -78,3 +82,28 @@ def test_tables_say_how_many_and_how_far_off():
     assert "0 false moves (at most 1.0e+00 of pairs at 95 %)" in pairs_table(still, [None])
     false = PairTrial(pair=("a", "c"), turn_rad=0.1, moved=0.999, inliers=9)
     assert "a and c: 5.73°" in pairs_table([*still, false], [None])
+
+
+@pytest.mark.parametrize("angles", [1, 2, 3])
+def test_a_known_turn_is_of_its_size_in_so_many_angles_of_the_pose(angles):
+    turn = known_turn(1.3, angles, np.random.default_rng(angles))
+    assert math.degrees(np.linalg.norm(cv2.Rodrigues(turn)[0])) == pytest.approx(1.3, abs=0.01)
+    after = pose_from_centre(turn @ PRIOR.rotation, PRIOR.centre_m)
+    changed = np.abs(np.degrees(turn_by_pose(PRIOR, after))) > 0.1
+    assert changed.sum() == angles
+
+
+def test_the_table_of_moves_counts_alerts_by_one_image_and_by_three():
+    trial = MoveTrial(
+        light="other hours",
+        size_deg=1.3,
+        angles=3,
+        inliers=370,
+        one=0.98,
+        three=0.9999,
+        one_alerts=False,
+        three_alert=True,
+    )
+    lost = replace(trial, inliers=0, one=0.0, three=0.0, three_alert=False)
+    text = moves_table([trial, trial, lost])
+    assert "| other hours | 1.3° | 3 | 3 | 370 | 0.9800 | 0 | 0.9999 | 2 |" in text
