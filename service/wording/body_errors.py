@@ -10,7 +10,7 @@ from pydantic_core import ErrorDetails
 from service.errors import FieldError
 from service.wording.language import N_, _
 
-_TIME = N_("must be an RFC 3339 time with a zone, such as 2026-11-20T08:00:00Z (got {got})")
+_TIME = N_("must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})")
 # By pydantic's type of error; `got` is the value received.
 _REASONS = {
     "missing": N_("is required"),
@@ -20,10 +20,10 @@ _REASONS = {
     "float_parsing": N_("must be a number (got {got})"),
     "float_type": N_("must be a number (got {got})"),
     "finite_number": N_("must be a finite number (got {got})"),
-    "greater_than": N_("must be more than {gt:g} (got {got})"),
-    "greater_than_equal": N_("must be at least {ge:g} (got {got})"),
-    "less_than": N_("must be less than {lt:g} (got {got})"),
-    "less_than_equal": N_("must be at most {le:g} (got {got})"),
+    "greater_than": N_("must be more than {gt} (got {got})"),
+    "greater_than_equal": N_("must be at least {ge} (got {got})"),
+    "less_than": N_("must be less than {lt} (got {got})"),
+    "less_than_equal": N_("must be at most {le} (got {got})"),
     "too_short": N_("must have at least {min_length} items (got {actual_length})"),
     "too_long": N_("must have at most {max_length} items (got {actual_length})"),
     "string_too_short": N_("must have at least {min_length} characters (got {got})"),
@@ -39,16 +39,16 @@ _REASONS = {
     "model_attributes_type": N_("must be an object (got {got})"),
     "model_type": N_("must be an object (got {got})"),
     "datetime_type": N_(
-        "must be an RFC 3339 time with a zone, such as 2026-11-20T08:00:00Z (got {got})"
+        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
     ),
     "datetime_parsing": N_(
-        "must be an RFC 3339 time with a zone, such as 2026-11-20T08:00:00Z (got {got})"
+        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
     ),
     "datetime_from_date_parsing": N_(
-        "must be an RFC 3339 time with a zone, such as 2026-11-20T08:00:00Z (got {got})"
+        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
     ),
     "timezone_aware": N_(
-        "must be an RFC 3339 time with a zone, such as 2026-11-20T08:00:00Z (got {got})"
+        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
     ),
     "int_parsing_size": N_("must be a smaller whole number (got {got})"),
     "json_invalid": N_("is not JSON: {error}"),
@@ -76,7 +76,8 @@ def _field_error(item: ErrorDetails) -> FieldError:
     got = _HIDDEN if any(part in _SECRET for part in item["loc"]) else item.get("input")
     if item["type"] in _REASONS:
         words = _REASONS[item["type"]]
-        reason = _(words, **{"got": _brief(got), **context})
+        limits = {name: _limit(value) for name, value in context.items()}
+        reason = _(words, **{"got": _brief(got), **limits})
     else:
         reason = str(context.get("error", item["msg"]))  # one of our own has `said`: it is whole
         # The checks of an object name the field that they reject.
@@ -87,6 +88,10 @@ def _field_error(item: ErrorDetails) -> FieldError:
         elif "said" not in context and not _GOT.search(reason) and not isinstance(got, dict | list):
             reason = f"{reason} (got {_brief(got)})"
     return FieldError(pointer=pointer[:200], reason=reason)
+
+
+def _limit(value: object) -> str:
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
 def _brief(value: object) -> str:

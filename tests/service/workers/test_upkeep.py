@@ -80,7 +80,7 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         session.connection(),
         Recorder(),
         "corner",
-        Batch(tracks=tuple(batch), rejections=()),
+        Batch(source=batch[0].source, tracks=tuple(batch), rejections=()),
         read_by=cameras.awaited(session.connection(), "corner").picture,
     )
 
