@@ -102,7 +102,7 @@ def test_an_opencv_file_fills_the_form(page, tmp_path):
     path = tmp_path / "other.yml"
     path.write_text("no calibration")
     page.locator("#file").set_input_files(path)
-    page.get_by_text("this is no OpenCV YAML").wait_for()
+    page.get_by_text("must be a calibration, OpenCV").wait_for()
 
 
 def test_what_was_typed_outlives_a_reload(page):

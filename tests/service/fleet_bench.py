@@ -78,13 +78,18 @@ class Fleet:
             reference.to_s = begun.timestamp() - 1e6
             session.add_all(self._estimates(camera_id, reference, state, estimates, drift))
 
-    def knock(self, camera_id, *, tilt_deg=3.0, kind="drift", severity="critical", by=None):
+    def knock(
+        self, camera_id, *, tilt_deg=3.0, kind="drift", severity="critical", by=None, drifted=None
+    ):
         """What a knock comes to: estimates that tell it, and an alert, whose id is returned."""
         with self.store.write() as session:
             reference = references.newest(session, camera_id)
             drift = {"tilt_deg": tilt_deg, "pan_deg": -0.8, "height_m": -0.12}
             state = "unsure" if kind == "unsure" else "drifting"
             last = self._estimates(camera_id, reference, state, 8, drift, still=0.0)
+            if drifted is not None:
+                for each in last:
+                    each.drifted = drifted
             session.add_all(last)
             alert = open_alert(
                 session, self.settings, camera_id, kind, severity,

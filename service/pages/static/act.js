@@ -8,6 +8,15 @@ export class Refused extends Error {
     super(problem.detail || problem.title);
     this.problem = problem;
   }
+
+  /** The reason with the name of its field if there is one reason; else the whole detail. */
+  get reason() {
+    const errors = this.problem.errors ?? [];
+    if (errors.length !== 1) return this.message;
+    const [{ pointer, reason }] = errors;
+    const field = pointer.split("/").at(-1);
+    return /^[a-z]\w*$/.test(field) ? `${field}: ${reason}` : reason;
+  }
 }
 
 /**

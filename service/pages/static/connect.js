@@ -129,8 +129,7 @@ async function send(file) {
     await post(file);
   } catch (error) {
     says.classList.add("wrong");
-    const reasons = error.problem?.errors ?? [];
-    says.textContent = reasons.length === 1 ? reasons[0].reason : error.message;
+    says.textContent = error.reason ?? error.message;
   }
   await look();
 }

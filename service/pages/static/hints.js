@@ -91,7 +91,7 @@ async function add() {
     await keep([...kept, mark]);
   } catch (error) {
     if (!(error instanceof Refused)) throw error;
-    says.textContent = error.problem.errors?.[0]?.reason ?? error.message;
+    says.textContent = error.reason;
     return; // what was typed stays
   }
   for (const name of ["from", "to", "length_m", "x_m", "y_m", "sd_m"]) form.elements[name].value = "";

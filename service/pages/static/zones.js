@@ -223,7 +223,7 @@ async function save() {
     await call("PUT", url, drawing.collection, { "If-Match": drawing.etag });
   } catch (error) {
     if (!(error instanceof Refused)) throw error;
-    says.textContent = error.problem.errors?.[0]?.reason ?? error.message;
+    says.textContent = error.reason;
     return; // what was drawn stays
   }
   announce(_("The zones are kept, as drawn at the pose of now."));
