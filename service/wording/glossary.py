@@ -14,7 +14,7 @@ WORDS = {
             "The newest tracks fit the camera's original position: it has not moved."
         ),
         STATES[PoseState.DRIFTING]: N_(
-            "The camera was knocked, sagged or was turned. The alert stays open until somebody "
+            "The camera was knocked, sagged or was turned. The alert stays open until an operator "
             "answers it or new tracks fit the original position again."
         ),
         STATES[PoseState.SUSPECTED]: N_(
