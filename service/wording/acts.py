@@ -22,64 +22,61 @@ ACTS: dict[Answer | Act, ActWords] = {
         one=N_("It was put back"),
         many=N_("They were put back"),
         done=N_("Put back"),
-        means=N_("The camera was turned to where it had been. What was learned stays."),
+        means=N_("The camera is back in its original position. The learned reference is kept."),
     ),
     Answer.ACCEPTED: ActWords(
         one=N_("Keep the new aim"),
         many=N_("Keep the new aims"),
         done=N_("New aim kept"),
-        means=N_("Where it looks now is right. That is learned anew."),
+        means=N_("The current position becomes the reference and is relearned."),
     ),
     Answer.MENDED: ActWords(
         one=N_("It was put right"),
         many=N_("They were put right"),
         done=N_("Put right"),
-        means=N_("Clock, tracker or view is as it should be. The next people tell."),
+        means=N_("Clock, tracker or view is correct again. Monitoring continues."),
     ),
     Answer.FALSE_ALARM: ActWords(
         one=N_("False alarm"),
         many=N_("False alarms"),
         done=N_("False alarm"),
-        means=N_("Nothing was wrong. The next people tell."),
+        means=N_("Nothing was wrong. Monitoring continues."),
     ),
     Act.ACKNOWLEDGE: ActWords(
         one=N_("Acknowledge"),
         many=N_("Acknowledge"),
         done=N_("Acknowledged"),
-        means=N_("Tell the others that you look after it. The alert stays open."),
+        means=N_("Shows others that you are working on the alert. It stays open."),
     ),
     Act.SILENCE: ActWords(
         one=N_("Silence…"),
         many=N_("Silence…"),
         done=N_("Silenced"),
-        means=N_("Nobody is woken by the alert for a time that you say. It stays open."),
+        means=N_("No notifications about the alert for a time that you choose. It stays open."),
     ),
     Act.MAINTENANCE: ActWords(
         one=N_("Plan maintenance…"),
         many=N_("Plan maintenance…"),
         done=N_("Maintenance planned"),
-        means=N_("Somebody is at the camera: nothing is judged or learned until they left."),
+        means=N_("While people work on the camera, nothing is estimated or learned."),
     ),
     Act.RESET: ActWords(
         one=N_("Learn anew at the old aim"),
         many=N_("Learn anew at the old aims"),
         done=N_("Being learned anew"),
-        means=N_("The camera stands, but other people walk there now, or elsewhere."),
+        means=N_("The camera has not moved, but people walk differently now: learn it again."),
     ),
     Act.TAG: ActWords(
         one=N_("Tag…"),
         many=N_("Tag…"),
         done=N_("Tagged"),
-        means=N_(
-            "Where a camera belongs, such as campus/north/gate, and words by which you find it, "
-            "such as outdoor."
-        ),
+        means=N_("A location, such as campus/north/gate, and search words, such as outdoor."),
     ),
     Act.UNDO: ActWords(
         one=N_("Undo"),
         many=N_("Undo"),
         done=N_("Undone"),
-        means=N_("Take back what was last said of the camera, if that is not long ago."),
+        means=N_("Reverts the last answer about the camera, if it is recent."),
     ),
 }
 # After "1 of 5" and "2 of 5": what those are that do not take what the others take.

@@ -1,93 +1,99 @@
-"""The words of pages for people who know no statistics; the docs' glossary has them from here."""
+"""Glossary of the pages, for readers without statistics; the docs' glossary includes it.
 
-from service.enums import Act, Answer
+Labels of states and actions come from where they are defined, so both are always the same.
+"""
+
+from service.enums import Act, AlertKind, Answer, PoseState
 from service.wording.acts import ACTS
+from service.wording.camera import STATES
 from service.wording.language import N_
 
 WORDS = {
-    N_("What cameras do"): {
-        N_("Steady"): N_("It stands where it should, as the newest people before it show."),
-        N_("Moved"): N_(
-            "It looks elsewhere than it did: it was knocked, sagged or was turned. An alert "
-            "fires until somebody answers it or people show otherwise."
+    N_("States"): {
+        STATES[PoseState.OK]: N_(
+            "The newest tracks fit the camera's original position: it has not moved."
         ),
-        N_("Maybe moved"): N_(
-            "Likelier moved than not, but by too little, or shown by too few people, for an "
-            "alert. The next people tell."
+        STATES[PoseState.DRIFTING]: N_(
+            "The camera was knocked, sagged or was turned. The alert stays open until an operator "
+            "answers it or new tracks fit the original position again."
         ),
-        N_("Unsure"): N_(
-            "Something changed and nobody can say what: people walk on none of the paths that"
-            " were learned. It was turned far, or they walk elsewhere. Look at its picture."
+        STATES[PoseState.SUSPECTED]: N_(
+            "A move is more likely than not, but too small or too uncertain for an alert. More "
+            "tracks will decide."
         ),
-        N_("Clock"): N_(
-            "People seem to walk too fast or too slowly. A wrong clock or frame rate looks "
-            "like that; the camera itself may well stand."
+        STATES[PoseState.UNSURE]: N_(
+            "People no longer walk on the learned paths. Either the camera turned far, or people "
+            "walk elsewhere. Check its image."
         ),
-        N_("Lens"): N_(
-            "It shows another angle of view: somebody zoomed, or its picture is cut or scaled "
-            "otherwise. The camera itself stands. Set it back, or say its new focal length."
+        STATES[AlertKind.CLOCK]: N_(
+            "People appear too fast or too slow, as with a wrong clock or frame rate. The camera "
+            "itself has probably not moved."
         ),
-        N_("No people"): N_(
-            "Nobody has come for longer than is usual there at such an hour. Camera, tracker "
-            "or network may be down; or the place is closed."
+        STATES[AlertKind.LENS]: N_(
+            "The angle of view changed: the lens was zoomed, or the image is cropped or scaled. "
+            "The camera itself has not moved. Restore the lens or enter its new focal length."
         ),
-        N_("Learning"): N_(
-            "People are still being counted to learn what is usual there. Nothing is judged yet."
+        STATES[PoseState.NO_DATA]: N_(
+            "No tracks for longer than usual at this hour. Camera, tracker or network may be "
+            "down, or the place is closed."
         ),
-        N_("Uncalibrated"): N_(
-            "Nobody has said how high it hangs and where it looks. The people before it tell,"
-            " and somebody has to agree to that."
+        STATES[PoseState.LEARNING]: N_(
+            "Too few tracks so far, to learn the reference or to know whether the camera moved."
         ),
-        N_("Unconnected"): N_("No track was ever posted for it, and no image was compared."),
+        STATES[PoseState.UNCALIBRATED]: N_(
+            "The camera's height and direction are unknown. Surefoot estimates them from the "
+            "first tracks and asks you to confirm them."
+        ),
+        STATES[PoseState.UNCONNECTED]: N_("No track was posted and no image was compared yet."),
     },
-    N_("How a camera stands"): {
-        N_("Tilt"): N_("How far it looks down; 0° looks at the horizon."),
-        N_("Roll"): N_("How far it hangs crooked; positive: its right side is lower."),
-        N_("Pan, or heading"): N_("The way it looks on the ground, clockwise, as on a compass."),
+    N_("Position"): {
+        N_("Tilt"): N_("How far the camera looks down; 0° is the horizon."),
+        N_("Roll"): N_("Rotation about the viewing direction; positive: its right side is lower."),
+        N_("Pan, or heading"): N_("Viewing direction on the ground, clockwise, as on a compass."),
         N_("Height"): N_("From the ground that people walk on to the camera."),
-        N_("Pose"): N_("These four together, and where on the ground it stands."),
+        N_("Pose"): N_("Tilt, roll, pan and height, with the position on the ground."),
         N_("Prior pose"): N_(
-            "The pose that was trusted last: said when the camera was added, agreed to, or "
-            "kept after a move. Moves are told against it."
+            "The last trusted pose: entered at registration, confirmed, or accepted after a "
+            "move. Moves are measured relative to it."
         ),
         N_("Drift"): N_(
-            "How far it stands off its prior pose, after what is usual there was taken off."
+            "Estimated pose minus prior pose, after subtracting the offset that the reference had."
         ),
         N_("Zone"): N_(
-            "An area or a line drawn in the picture. When the camera moves, it is drawn where"
-            " it belongs now."
+            "An area or line drawn in the image. After a move, it is redrawn where it belongs."
         ),
     },
-    N_("What it is told by"): {
-        N_("Track"): N_("The way of one person through the picture, as a tracker draws it."),
+    N_("Evidence"): {
+        N_("Track"): N_("The path of one person through the image, from a tracker."),
         N_("Tracker"): N_(
-            "The program that finds people in a camera's pictures and sends their tracks. Of "
-            "several for one camera, one counts."
+            "The program that detects people in a camera's images and posts their tracks. If a "
+            "camera has several, one is active."
         ),
-        N_("Person"): N_("Counted once, though a tracker may draw one walk in pieces."),
+        N_("Person"): N_("Counts once, even if the tracker splits a walk into several tracks."),
         N_("Reference"): N_(
-            "What is usual before a camera that stands: where people walk, and how fast. It "
-            "is learned of the first people, some 200, and a move is told by it."
+            "Where people walk and how fast, learned from the first tracks (about 200) of a "
+            "stationary camera. Moves are detected relative to it."
         ),
-        N_("Picture"): N_(
-            "A still image beside the people, where that is switched on: a second witness."
+        N_("Image"): N_(
+            "A snapshot that is compared with earlier ones, if enabled. It shows a turn even "
+            "without people."
         ),
         N_("Sure to"): N_(
-            "“Tilt 22.1°, 21.8° to 22.4°” means: nine times of ten the true number lies "
-            "between the two. Where people cannot tell a number, none is shown."
+            "“Tilt 22.1°, 21.8° to 22.4°” means that the true value is between the two in nine of "
+            "ten cases. A value that tracks do not determine is omitted."
         ),
         N_("False alarm"): N_(
-            "An alert of a camera that never moved. How many there may be in a year is a setting."
+            "An alert although the camera did not move. A setting limits their number per year."
         ),
     },
-    N_("What is done"): {
-        N_("It was put back"): ACTS[Answer.PUT_BACK].means,
-        N_("Keep the new aim"): ACTS[Answer.ACCEPTED].means,
-        N_("It was put right"): ACTS[Answer.MENDED].means,
-        N_("Acknowledge"): ACTS[Act.ACKNOWLEDGE].means,
+    N_("Actions"): {
+        ACTS[Answer.PUT_BACK].one: ACTS[Answer.PUT_BACK].means,
+        ACTS[Answer.ACCEPTED].one: ACTS[Answer.ACCEPTED].means,
+        ACTS[Answer.MENDED].one: ACTS[Answer.MENDED].means,
+        ACTS[Act.ACKNOWLEDGE].one: ACTS[Act.ACKNOWLEDGE].means,
         N_("Silence"): ACTS[Act.SILENCE].means,
         N_("Maintenance"): ACTS[Act.MAINTENANCE].means,
-        N_("Learn anew at the old aim"): ACTS[Act.RESET].means,
+        ACTS[Act.RESET].one: ACTS[Act.RESET].means,
         N_("Site and tags"): ACTS[Act.TAG].means,
     },
 }

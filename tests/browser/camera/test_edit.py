@@ -117,7 +117,7 @@ def test_it_is_deleted_by_typing_its_name_and_other_pages_say_so(
 
 def test_what_is_set_and_what_words_mean(opened):
     opened.get_by_role("link", name="Glossary").click()
-    opened.get_by_role("heading", name="How a camera stands").wait_for()
+    opened.get_by_role("heading", name="Position").wait_for()
     assert axe(opened) == []
     shoot(opened, "glossary")
     opened.get_by_role("link", name="Settings").click()
