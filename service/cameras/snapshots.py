@@ -122,15 +122,15 @@ def show_stood(session: Session, settings: Settings, camera_id: str) -> bytes:
 
 
 def remove_snapshot(session: Session, camera_id: str) -> None:
-    """Delete the still image of a camera; allowed whatever the settings are.
+    """Delete a camera's image and its features, whatever the settings are.
 
     Raises:
-        NotFoundError: there is no such camera, or none of it is kept.
+        NotFoundError: the camera does not exist, or neither image nor features of it are kept.
     """
     require_camera(session, camera_id)
-    pictures.forget(session, camera_id)
-    if not cameras.remove_image(session, SnapshotRecord, camera_id):
-        raise NotFoundError(f"snapshot: none is kept of camera {camera_id!r}")
+    features = pictures.forget(session, camera_id)
+    if not cameras.remove_image(session, SnapshotRecord, camera_id) and not features:
+        raise NotFoundError(f"snapshot: neither image nor features of {camera_id!r} are kept")
     note(session, Activity.SNAPSHOT_REMOVED, by=None, camera_id=camera_id)
 
 

@@ -133,10 +133,14 @@ def unmatched(session: Session, camera_id: str) -> bytes | None:
     )
 
 
-def forget(session: Session, camera_id: str) -> None:
-    """Delete all that pictures have told of a camera."""
-    for record in (PictureReferenceRecord, PictureRecord):
-        session.execute(delete(record).where(record.camera_id == camera_id))
+def forget(session: Session, camera_id: str) -> bool:
+    """Delete what is kept of a camera's images beside the newest one; False if nothing was."""
+    return any(
+        [
+            session.execute(delete(record).where(record.camera_id == camera_id)).rowcount  # type: ignore[attr-defined]
+            for record in (PictureReferenceRecord, PictureRecord)
+        ]
+    )
 
 
 def note_agreement(session: Session, camera_id: str, *, people_moved: bool) -> None:

@@ -10,9 +10,10 @@ from PIL import Image
 from service.app import create_app
 from service.formats import confined
 from service.formats.still import read_still
-from service.store import cameras
+from service.store import cameras, pictures
 from service.store.cameras import CameraRecord, DueImage, SnapshotRecord
 from service.store.engines.store import Store
+from service.store.pictures import PictureReferenceRecord
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
 
@@ -163,3 +164,15 @@ def test_a_picture_of_the_future_gives_way_and_the_next_is_due(allowed, settings
         (due,) = cameras.snapshots_due(session, now, every)
         assert due == DueImage(camera_id="corner", url="http://10.0.0.1/", answers=True)
     assert allowed.put(URL, content=image(), headers=JPEG).status_code == 200
+
+
+def test_features_without_an_image_are_deleted(corner, settings):
+    with Store(settings).write() as session:
+        prior_id = cameras.prior_pose(session, "corner").id
+        session.add(
+            PictureReferenceRecord(camera_id="corner", prior_pose_id=prior_id, features=b"kept")
+        )
+    assert corner.delete(URL).status_code == 204
+    with Store(settings).read() as session:
+        assert pictures.gallery(session, prior_id) == []
+    problem(corner.delete(URL), 404, "not_found")
