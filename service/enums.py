@@ -24,6 +24,13 @@ class PoseState(StrEnum):
     NO_DATA = "no_data"
 
 
+class RunKind(StrEnum):
+    """The kind of an estimation run: monitor updates the drift chart alone, full also the pose."""
+
+    MONITOR = "monitor"
+    FULL = "full"
+
+
 class Cause(StrEnum):
     """Since what a camera waits for people to tell how it stands."""
 
