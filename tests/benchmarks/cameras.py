@@ -33,7 +33,7 @@ from service.workers.heartbeat import BEAT_S
 from tests.benchmarks.load import quantiles
 from tests.benchmarks.parts.cloned import APART_S, QUEUED, as_posted, camera_at, people, seed
 from tests.benchmarks.parts.http_client import Connection
-from tests.benchmarks.parts.monitored import CheckWatch, delays_s, knock_alerts
+from tests.benchmarks.parts.monitored import CheckWatch, count_estimates, delays_s, knock_alerts
 from tests.running import RunningService, free_port, wait_for
 from tests.service.street import KNOCKED
 
@@ -245,7 +245,8 @@ def _run(
         "tracks_overdue_at_the_end": overdue,
         "knocked": len(knocked),
         "alerts": [asdict(alert) for alert in alerts],
-        "runs": runs,
+        "runs": {name: round(number, 2) for name, number in runs.items()},
+        "estimates_stored": count_estimates(database, begun_s),
         "cpu_s": cpu,
         "queued": watch.queued,
         "memory_mb": {name: round(mb) for name, mb in memory.items()},

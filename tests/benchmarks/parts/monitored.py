@@ -89,6 +89,13 @@ def delays_s(
     return delays, overdue
 
 
+def count_estimates(database: Path, begun_s: float) -> int:
+    """The number of full estimates that were stored from a time on."""
+    with connected(database) as connection:
+        query = "SELECT count(*) FROM estimates WHERE created_at >= ?"
+        return int(connection.execute(query, (stored(begun_s),)).fetchone()[0])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnockAlert:
     """The first alert of a knocked camera about its pose.
@@ -131,8 +138,8 @@ def knock_alerts(
             KnockAlert(
                 camera_id=camera_id,
                 kind=kind,
-                after_knock_s=opened_s - knocked_s,
-                after_cause_s=opened_s - min(new, default=opened_s),
+                after_knock_s=round(opened_s - knocked_s, 1),
+                after_cause_s=round(opened_s - min(new, default=opened_s), 1),
                 tracks=len(came),
             )
         )
