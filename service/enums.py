@@ -25,7 +25,11 @@ class PoseState(StrEnum):
 
 
 class RunKind(StrEnum):
-    """The kind of an estimation run: monitor updates the drift chart alone, full also the pose."""
+    """The kind of an estimation run.
+
+    A monitor run updates the drift chart and slow drift alone. All others are full: they estimate
+    the pose, learn a reference or renew the flow map, or find that nothing is new.
+    """
 
     MONITOR = "monitor"
     FULL = "full"

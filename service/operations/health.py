@@ -192,9 +192,9 @@ class Metrics:
 def load_metrics(session: Session, settings: Settings) -> Metrics:
     """The metrics now, by a dozen statements for all cameras."""
     now = datetime.now(UTC)
+    waiting = tracks.unseen_since(session)
     unseen_s = {
-        camera_id: max((now - at).total_seconds(), 0.0)
-        for camera_id, (_, at) in tracks.unseen_since(session).items()
+        camera_id: max((now - at).total_seconds(), 0.0) for camera_id, (_, at) in waiting.items()
     }
     known = workers.every(session)
     return Metrics(
@@ -211,7 +211,7 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
         events=journal.newest_event_id(session),
         bridges=bridges.every(session),
         runs=runs.totals(session),
-        result_ages=result_ages(session, now),
+        result_ages=result_ages(session, waiting, now),
     )
 
 

@@ -1,5 +1,6 @@
 """Age of the fleet's results: how far monitoring and full estimates are behind the tracks."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -7,7 +8,10 @@ import numpy as np
 from sqlalchemy.orm import Session
 
 from service.enums import RunKind
-from service.store import fleet, tracks
+from service.store import fleet
+
+# The oldest track of each camera that no run has read, and when it arrived.
+Waiting = Mapping[str, tuple[int, datetime]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,14 +23,13 @@ class ResultAges:
     worst_s: float
 
 
-def result_ages(session: Session, now: datetime) -> dict[RunKind, ResultAges]:
+def result_ages(session: Session, waiting: Waiting, now: datetime) -> dict[RunKind, ResultAges]:
     """The age of results by the kind of run that makes them; kinds without any are missing.
 
     Monitoring: from the arrival of a camera's newest track to `checked_at`, or to now from the
     oldest track that waits. Full estimates: from `updated_at` to the newest track, 0 if the
     estimate is the newer one.
     """
-    waiting = tracks.unseen_since(session)
     ages: dict[RunKind, list[float]] = {kind: [] for kind in RunKind}
     for camera_id, received_at, checked_at, updated_at in fleet.result_times(session):
         if camera_id in waiting:

@@ -13,7 +13,7 @@ from service.api.middleware.dependencies import ReadDep, StateDep
 from service.api.middleware.pages import render
 from service.enums import RunKind, TokenScope
 from service.notifications.webhooks import list_webhooks
-from service.operations.result_ages import ResultAges, result_ages
+from service.operations.result_ages import ResultAges, Waiting, result_ages
 from service.operations.troubles import find_troubles
 from service.pages.drawings.sparkline import trend
 from service.store import bridges, cameras, pictures, runs, tracks, workers
@@ -23,7 +23,7 @@ from service.wording.times import Clock, duration
 router = APIRouter(include_in_schema=False)
 
 _HOURS = 24
-KINDS = {RunKind.MONITOR: N_("Monitoring"), RunKind.FULL: N_("Full estimate")}
+_KINDS = {RunKind.MONITOR: N_("Monitoring"), RunKind.FULL: N_("Full estimate")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,10 +45,10 @@ class RunRow:
         return 1000 * self.cpu_s / self.runs if self.runs else None
 
 
-def _run_rows(session: Session, now: datetime) -> list[RunRow]:
-    ages, hours = result_ages(session, now), runs.by_hour(session, _HOURS, now)
+def _run_rows(session: Session, waiting: Waiting, now: datetime) -> list[RunRow]:
+    ages, hours = result_ages(session, waiting, now), runs.by_hour(session, _HOURS, now)
     rows = []
-    for kind, name in KINDS.items():
+    for kind, name in _KINDS.items():
         total = sum(hours[kind], start=runs.RunTotal())
         drawing = trend([hour.cpu_s for hour in hours[kind]])
         row = RunRow(
@@ -73,13 +73,14 @@ def show(request: Request, state: StateDep, session: ReadDep) -> HTMLResponse:
     """Workers, queue, results, bridges and webhooks, with their failures."""
     caller: Caller | None = request.state.caller
     now = datetime.now(UTC)
-    came = [at for _, at in tracks.unseen_since(session).values()]
+    waiting = tracks.unseen_since(session)
+    came = [at for _id, at in waiting.values()]
     return render(
         request,
         "health.html",
         clock=Clock(now=now, zone=state.settings.zone),
         troubles=find_troubles(session, state.settings),
-        run_rows=_run_rows(session, now),
+        run_rows=_run_rows(session, waiting, now),
         workers=workers.every(session),
         bridges=bridges.every(session),
         waiting=len(came),

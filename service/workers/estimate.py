@@ -51,6 +51,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
     What fails beside the served estimate is said and stops nothing. Where that itself fails, the
     camera rests, longer each time, and the failure is told; others are not held up.
     """
+    begun_s, kind = time.thread_time(), RunKind.FULL
     with context.store.write(camera_id) as session:
         if leave_poisoned(session, camera_id):
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
@@ -58,7 +59,6 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
         # The mark "due" goes first: tracks that arrive from then on ask for a look of their own.
         newest_pk, asked = begin_look(session, camera_id)
         budget = budget_of(session, camera_id)
-    begun_s, kind = time.thread_time(), RunKind.FULL
     try:
         with limited_effort(context.settings.estimate_cpu_s):
             kind = _look(context, camera_id, newest_pk, budget, asked=asked)
@@ -83,7 +83,7 @@ def _look(
     Until a full estimate is due or `asked` for, new tracks update the monitor alone.
 
     Returns:
-        The kind of this run; full if there is no reference yet.
+        The kind of this run.
     """
     store, settings = context.store, context.settings
     begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked(budget)

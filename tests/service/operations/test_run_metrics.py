@@ -1,21 +1,27 @@
 """Runs, CPU seconds and age of results in `/metrics`, from the worker to the scrape."""
 
+import os
+import threading
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import update
 
 from models.errors import TooFewTrajectoriesError
+from service.commands import worker
 from service.enums import RunKind
+from service.errors import StorageFullError
+from service.job_queue import JobQueue
 from service.operations.result_ages import result_ages
-from service.store import runs
+from service.store import runs, tracks
 from service.store.cameras import CameraRecord
 from service.store.engines.store import Store
 from service.store.estimates import EstimateRecord
 from service.store.runs import RunTotal
 from service.store.tracks import TrackRecord
 from service.workers import estimate
-from service.workers.context import RunCounts
+from service.workers.context import JobContext, RunCounts
+from service.workers.processes.workers import register_worker
 from tests.conftest import track
 from tests.service.operations.test_metrics import scrape, value
 from tests.service.street import PRIOR, known_street
@@ -52,8 +58,15 @@ def test_metrics_have_the_stored_runs_by_kind(http, store):
     assert value(scraped, CPU_S, kind="full") == pytest.approx(0.5)
 
 
-def test_a_run_with_few_new_tracks_is_counted_as_monitor(http, settings):
-    street = known_street(http, settings, 60)
+@pytest.fixture
+def street(http, settings):
+    made = known_street(http, settings, 60)
+    made.context.runs.take()
+    yield made
+    made.close()
+
+
+def test_a_run_with_few_new_tracks_is_counted_as_monitor(street):
     street.keep_to_lanes(PRIOR, 60)
     street.look()
     street.context.runs.take()
@@ -67,10 +80,7 @@ def test_a_run_with_few_new_tracks_is_counted_as_monitor(http, settings):
     assert street.context.runs.take()[RunKind.FULL].runs == 1
 
 
-def test_a_run_that_fails_is_counted_with_its_cpu_time(http, settings, monkeypatch):
-    street = known_street(http, settings, 60)
-    street.context.runs.take()
-
+def test_a_run_that_fails_is_counted_with_its_cpu_time(street, monkeypatch):
     def fail(*_args, **_named):
         raise TooFewTrajectoriesError("tracks: at least 5 are needed, got 0")
 
@@ -103,7 +113,7 @@ def checked(corner, store):
 
 def test_age_of_monitoring_is_from_the_newest_track_to_its_check(checked, store):
     with store.read() as session:
-        found = result_ages(session, checked)
+        found = result_ages(session, tracks.unseen_since(session), checked)
     assert found[RunKind.MONITOR].median_s == pytest.approx(4.0)
     assert found[RunKind.MONITOR].worst_s == pytest.approx(4.0)
     assert RunKind.FULL not in found
@@ -112,7 +122,8 @@ def test_age_of_monitoring_is_from_the_newest_track_to_its_check(checked, store)
 def test_age_of_monitoring_grows_while_a_track_waits(checked, corner, store):
     corner.post("/cameras/corner/tracks", json={"tracks": [track("2")]}).raise_for_status()
     with store.read() as session:
-        found = result_ages(session, datetime.now(UTC) + timedelta(seconds=30))
+        waiting = tracks.unseen_since(session)
+        found = result_ages(session, waiting, datetime.now(UTC) + timedelta(seconds=30))
     assert found[RunKind.MONITOR].worst_s == pytest.approx(30.0, abs=5.0)
 
 
@@ -125,3 +136,35 @@ def test_age_of_the_full_estimate_is_to_the_newest_track(bench):
     for statistic in ("median", "p95", "max"):
         labels = {"kind": "full", "statistic": statistic}
         assert value(found, "surefoot_result_age_seconds", **labels) == pytest.approx(75.0)
+
+
+@pytest.fixture
+def context(settings, store, monkeypatch):
+    """A worker that ends after a few heartbeats and has made a monitor run."""
+    monkeypatch.setattr(worker, "BEAT_S", 0.02)
+    with store.write() as session:
+        register_worker(session, "one", os.getpid())
+    context = JobContext(settings=settings, store=store, queue=JobQueue(store.engine))
+    context.runs.add(RunKind.MONITOR, RunTotal(runs=3, cpu_s=0.02))
+    timer = threading.Timer(0.5, context.stopping.set)
+    timer.start()
+    yield context
+    timer.join()
+    context.queue.close()
+
+
+def test_heartbeat_stores_the_runs_of_a_worker_once(context, http):
+    assert worker._mind(context, "one") == 0
+    found = scrape(http)
+    assert value(found, RUNS, kind="monitor") == 3
+    assert value(found, CPU_S, kind="monitor") == pytest.approx(0.02)
+
+
+def test_heartbeat_that_cannot_be_stored_keeps_the_runs(context, http, monkeypatch):
+    def fail(*_args):
+        raise StorageFullError("the disk is full")
+
+    monkeypatch.setattr(worker, "heartbeat", fail)
+    assert worker._mind(context, "one") == 0
+    assert value(scrape(http), RUNS, kind="monitor") == 0
+    assert context.runs.take() == {RunKind.MONITOR: RunTotal(runs=3, cpu_s=0.02)}
