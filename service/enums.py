@@ -24,6 +24,17 @@ class PoseState(StrEnum):
     NO_DATA = "no_data"
 
 
+class RunKind(StrEnum):
+    """The kind of an estimation run.
+
+    A monitor run updates the drift chart and slow drift alone. All others are full: they estimate
+    the pose, learn a reference or renew the flow map, or find that nothing is new.
+    """
+
+    MONITOR = "monitor"
+    FULL = "full"
+
+
 class Cause(StrEnum):
     """Since what a camera waits for people to tell how it stands."""
 

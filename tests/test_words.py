@@ -58,6 +58,7 @@ OTHERS = {
     ("notifications/outbox.py", "drift"): "the name of a field",
     ("notifications/outbox.py", "silenced"): "the name of a flag",
     ("workers/upkeep/retention.py", "tracks"): "the name of a limit, for the log",
+    ("api/middleware/connections.py", "full"): "why a connection is refused, for a count",
     ("api/ground.py", "pose"): "a tag of the API's description",
     ("api/maintenance.py", "maintenance"): "a tag of the API's description",
     ("api/aim.py", "pose"): "a tag of the API's description",

@@ -518,6 +518,16 @@ table(
     *optional(String, "trouble"),
 )
 table("store_probes", key("id", NUMBER), *needed(DateTime, "written_at"))
+table(
+    "estimation_run_hours",
+    key("id", NUMBER),
+    *needed(String, "kind"),
+    one_of("kind", "monitor full"),
+    *needed(DateTime, "hour_at"),
+    *needed(NUMBER, "runs"),
+    *needed(Double, "cpu_s"),
+    Index(None, "kind", "id"),
+)
 
 # Entries of the log are never changed, and for 30 days not deleted.
 SQLITE_TRIGGERS = (

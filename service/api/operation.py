@@ -58,6 +58,7 @@ class MetricsCollector(Collector):
         yield InfoMetricFamily("surefoot_build", "Version.", value={"version": version("surefoot")})
         yield from _of_cameras(self._metrics)
         yield from _of_looks(self._metrics)
+        yield from _of_runs(self._metrics)
         yield from _of_alerts(self._metrics)
         yield from _of_webhooks(self._metrics)
         yield from _of_service(self._metrics)
@@ -119,6 +120,36 @@ def _of_looks(metrics: Metrics) -> Iterator[Metric]:
     )
     failing = "Cameras whose last look failed."
     yield GaugeMetricFamily("surefoot_cameras_failing", failing, value=len(metrics.failing))
+
+
+def _of_runs(metrics: Metrics) -> Iterator[Metric]:
+    runs = CounterMetricFamily(
+        "surefoot_estimation_runs",
+        "Estimation runs: monitor updates the drift chart alone, full also the pose.",
+        labels=["kind"],
+    )
+    cpu = CounterMetricFamily(
+        "surefoot_estimation_cpu_seconds", "CPU time of estimation runs.", labels=["kind"]
+    )
+    for kind, total in metrics.runs.items():
+        runs.add_metric([kind], total.runs)
+        cpu.add_metric([kind], total.cpu_s)
+    yield runs
+    yield cpu
+    yield _gauge(
+        "surefoot_result_age_seconds",
+        "Age of results relative to the newest track of each camera, over all cameras.",
+        ["kind", "statistic"],
+        {
+            (kind, statistic): value
+            for kind, ages in metrics.result_ages.items()
+            for statistic, value in (
+                ("median", ages.median_s),
+                ("p95", ages.p95_s),
+                ("max", ages.worst_s),
+            )
+        },
+    )
 
 
 def _of_alerts(metrics: Metrics) -> Iterator[Metric]:

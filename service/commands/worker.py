@@ -11,6 +11,8 @@ from service.data_dir import telling_of
 from service.errors import ServiceError
 from service.job_queue import DELIVER_JOB, ESTIMATE_JOB, TRAIN_JOB, JobQueue
 from service.settings import Settings
+from service.store import runs
+from service.store.engines.dialects import now_in
 from service.store.engines.sqlite import FileLock
 from service.store.engines.store import Store
 from service.workers import engine
@@ -107,8 +109,10 @@ def _mind(context: JobContext, name: str) -> int:
     lost_s = settings.worker_lost_s
     trimmed_s, draining = time.monotonic(), None
     while not context.stopping.wait(BEAT_S):
+        made = context.runs.take()
         try:
             with context.store.write(WORKERS) as session:
+                runs.add(session, made, now_in(session))
                 alive = heartbeat(session, name, os.getpid())
                 lost = watch.take_lost(session, context.queue, lost_s) if alive else []
             if not alive:
@@ -118,6 +122,8 @@ def _mind(context: JobContext, name: str) -> int:
                 log.warning("workers_lost", extra={"workers": lost})
         except (SQLAlchemyError, ServiceError) as error:  # a full disk, for example
             log.warning("heartbeat_failed", extra={"worker": name, "why": str(error)})
+            for kind, total in made.items():
+                context.runs.add(kind, total)
         if draining is not None:
             # A training beyond its own ceiling is not waited for: it would be minutes.
             if not draining.is_alive() or not context.running.of_kind(ESTIMATE_JOB, DELIVER_JOB):

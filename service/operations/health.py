@@ -1,7 +1,7 @@
 """The health of the service: its readiness, as `/readyz` says it, and the metrics of a moment."""
 
 import shutil
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -10,14 +10,16 @@ from sqlalchemy.orm import Session
 
 from service.alerts.bridges import problem_of
 from service.cameras.status import CameraStatus, camera_statuses
-from service.enums import TrainingState
+from service.enums import RunKind, TrainingState
 from service.errors import ServiceError
+from service.operations.result_ages import ResultAges, result_ages
 from service.settings import Settings
 from service.store import (
     bridges,
     cameras,
     fleet,
     journal,
+    runs,
     tracks,
     trainings,
     webhooks,
@@ -29,6 +31,7 @@ from service.store.cameras import CameraRecord
 from service.store.engines.dialects import now_in
 from service.store.engines.failures import failure_of
 from service.store.engines.store import Store
+from service.store.runs import RunTotal
 from service.wording.reasons import in_words
 
 _LONGEST_LAG_S = 60.0
@@ -182,14 +185,16 @@ class Metrics:
     queue_lag_s: float
     events: int
     bridges: Sequence[BridgeRecord]
+    runs: Mapping[RunKind, RunTotal]
+    result_ages: Mapping[RunKind, ResultAges]
 
 
 def load_metrics(session: Session, settings: Settings) -> Metrics:
     """The metrics now, by a dozen statements for all cameras."""
     now = datetime.now(UTC)
+    waiting = tracks.unseen_since(session)
     unseen_s = {
-        camera_id: max((now - at).total_seconds(), 0.0)
-        for camera_id, (_, at) in tracks.unseen_since(session).items()
+        camera_id: max((now - at).total_seconds(), 0.0) for camera_id, (_, at) in waiting.items()
     }
     known = workers.every(session)
     return Metrics(
@@ -205,6 +210,8 @@ def load_metrics(session: Session, settings: Settings) -> Metrics:
         queue_lag_s=max(unseen_s.values(), default=0.0),
         events=journal.newest_event_id(session),
         bridges=bridges.every(session),
+        runs=runs.totals(session),
+        result_ages=result_ages(session, waiting, now),
     )
 
 

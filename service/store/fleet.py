@@ -7,6 +7,7 @@ import math
 from collections import defaultdict, namedtuple
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cache, lru_cache
 from typing import Any
 
@@ -331,6 +332,32 @@ def _learning_counts(counts: ColumnElement[bool], *, some: bool) -> Select[str, 
             SiteReferenceRecord.ready_at.is_(None),
         )
     )
+
+
+def result_times(
+    session: Session,
+) -> list[tuple[str, datetime, datetime | None, datetime | None]]:
+    """The times of each camera that has tracks, in order of ids.
+
+    Returns:
+        The camera, when its newest track arrived, when it was checked and its newest estimate made.
+    """
+    newest = select(func.max(TrackRecord.id)).where(TrackRecord.camera_id == CameraRecord.id)
+    query = (
+        select(
+            CameraRecord.id,
+            TrackRecord.received_at,
+            CameraRecord.checked_at,
+            EstimateRecord.created_at,
+        )
+        .join(TrackRecord, TrackRecord.id == newest.correlate(CameraRecord).scalar_subquery())
+        .outerjoin(
+            EstimateRecord,
+            EstimateRecord.id == newest_of(EstimateRecord.id, EstimateRecord.camera_id),
+        )
+        .order_by(CameraRecord.id)
+    )
+    return [(row[0], row[1], row[2], row[3]) for row in session.execute(query)]
 
 
 def firing(session: Session, ids: Ids) -> Sequence[AlertRecord]:

@@ -53,6 +53,7 @@ _STORED: dict[type[StrEnum], str] = {
     enums.Outcome: "outcome",
     enums.PoseState: "state",
     Projection: "projection",
+    enums.RunKind: "kind",
     enums.Severity: "severity",
     enums.TrainingState: "state",
     enums.WebhookFormat: "format",

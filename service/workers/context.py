@@ -8,10 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from models.durations import HOUR_S
+from service.enums import RunKind
 from service.job_queue import JobQueue
 from service.reasons import Reasons
 from service.settings import Settings
 from service.store.engines.store import Store
+from service.store.runs import RunTotal
 from service.training import StepWatch
 
 UPKEEP = "upkeep"  # the kind of periodic work
@@ -59,6 +61,25 @@ class RunningJobs:
                 if now_s - job.begun_s > self.limits_s.get(job.kind, float("inf")):
                     return job
         return None
+
+
+class RunCounts:
+    """Estimation runs of this process by kind, until the next heartbeat stores them."""
+
+    def __init__(self) -> None:
+        self._found: dict[RunKind, RunTotal] = {}
+        self._lock = threading.Lock()
+
+    def add(self, kind: RunKind, more: RunTotal) -> None:
+        """Count runs."""
+        with self._lock:
+            self._found[kind] = self._found.get(kind, RunTotal()) + more
+
+    def take(self) -> dict[RunKind, RunTotal]:
+        """Return the counts and start again at zero."""
+        with self._lock:
+            found, self._found = self._found, {}
+        return found
 
 
 _SHARE = 0.1  # of a worker's time, where estimates wait for it
@@ -127,6 +148,7 @@ class JobContext:
     queue: JobQueue
     stopping: threading.Event = field(default_factory=threading.Event)
     running: RunningJobs = field(default_factory=RunningJobs)
+    runs: RunCounts = field(default_factory=RunCounts)
     growth_cooldown: GrowthCooldown = field(default_factory=GrowthCooldown)
     growth_budget: GrowthBudget = field(default_factory=GrowthBudget)
     steps: StepWatch = field(default_factory=StepWatch)

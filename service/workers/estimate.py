@@ -8,6 +8,7 @@ from models.assessment import Monitored
 from models.effort import limited_effort
 from models.errors import CheckpointError
 from models.tracks.image_size import doubt_image_size
+from service.enums import RunKind
 from service.estimate_queue import (
     begin_look,
     budget_of,
@@ -35,6 +36,7 @@ from service.estimation.proposal import compute_proposal, load_people, save_prop
 from service.estimation.seen_picture import ask_in_doubt
 from service.store.estimates import EstimateRecord
 from service.store.look_budget import LookBudget
+from service.store.runs import RunTotal
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
 
@@ -49,6 +51,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
     What fails beside the served estimate is said and stops nothing. Where that itself fails, the
     camera rests, longer each time, and the failure is told; others are not held up.
     """
+    begun_s, kind = time.thread_time(), RunKind.FULL
     with context.store.write(camera_id) as session:
         if leave_poisoned(session, camera_id):
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
@@ -58,11 +61,13 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
         budget = budget_of(session, camera_id)
     try:
         with limited_effort(context.settings.estimate_cpu_s):
-            _look(context, camera_id, newest_pk, budget, asked=asked)
+            kind = _look(context, camera_id, newest_pk, budget, asked=asked)
     except Exception as error:
         with context.store.write(camera_id) as session:
             fail_look(session, camera_id, repr(error))
         raise
+    finally:
+        context.runs.add(kind, RunTotal(runs=1, cpu_s=time.thread_time() - begun_s))
 
 
 def _look(
@@ -72,10 +77,13 @@ def _look(
     budget: LookBudget,
     *,
     asked: bool,
-) -> None:
+) -> RunKind:
     """Estimate from all tracks up to one. No transaction is open while anything is computed.
 
     Until a full estimate is due or `asked` for, new tracks update the monitor alone.
+
+    Returns:
+        The kind of this run.
     """
     store, settings = context.store, context.settings
     begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked(budget)
@@ -83,7 +91,7 @@ def _look(
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
             end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
-        return
+        return RunKind.FULL
     failures.unless_failed("picture", partial(compare_if_due, context, camera_id))
     missing = predict_pending(context, camera_id, unpacked)
     if missing:
@@ -92,7 +100,7 @@ def _look(
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
             end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
-        return
+        return RunKind.FULL
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked, asked=asked)
@@ -113,8 +121,10 @@ def _look(
         end_look(
             session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
         )
-    if not isinstance(found, Monitored):
-        _grow_unless_failed(context, camera_id, unpacked)
+    if isinstance(found, Monitored):
+        return RunKind.MONITOR
+    _grow_unless_failed(context, camera_id, unpacked)
+    return RunKind.FULL
 
 
 def _log_estimate(record: EstimateRecord | None) -> None:

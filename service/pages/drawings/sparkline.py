@@ -1,4 +1,4 @@
-"""A camera's drift of late as a small line, with the limit as another."""
+"""A series as a small line, with a limit as another."""
 
 from collections.abc import Sequence
 
@@ -8,10 +8,16 @@ _WIDTH, _HEIGHT = 96, 26
 _LEAST_TOP, _MOST_TOP = 1.5, 4.0  # limits that the height stands for
 
 
-def sparkline(history: Sequence[float | None], places: int = 24) -> Markup:
-    """The drift in units of its limit, newest at the right; the dashed line is the limit.
+def trend(history: Sequence[float]) -> Markup:
+    """Values of at least 0 relative to their maximum, newest at the right, without a limit."""
+    top = max([*history, 1e-9])
+    return sparkline([_LEAST_TOP * value / top for value in history], limited=False)
 
-    Hidden from screen readers: what it shows is said in words beside it.
+
+def sparkline(history: Sequence[float | None], places: int = 24, *, limited: bool = True) -> Markup:
+    """Values in units of their limit, newest at the right; the dashed line is the limit.
+
+    Hidden from screen readers: the text beside it has the values.
     """
     values = [value for value in history if value is not None]
     top = min(max([_LEAST_TOP, *(1.1 * value for value in values)]), _MOST_TOP)
@@ -28,11 +34,11 @@ def sparkline(history: Sequence[float | None], places: int = 24) -> Markup:
     end = ""
     if history and history[-1] is not None:
         end = f'<circle cx="{_WIDTH}" cy="{_height(history[-1], top):.1f}" r="2.2"/>'
+    dashed = f'<path class="limit" d="M0 {limit:.1f}H{_WIDTH}"/>' if limited else ""
     return Markup(
         f'<svg class="spark" viewBox="-2 0 {_WIDTH + 5} {_HEIGHT}" width="{_WIDTH + 5}" '
         f'height="{_HEIGHT}" aria-hidden="true">'
-        f'<path class="limit" d="M0 {limit:.1f}H{_WIDTH}"/>'
-        f'<path class="line" d="{line}"/>{end}</svg>'
+        f'{dashed}<path class="line" d="{line}"/>{end}</svg>'
     )
 
 

@@ -15,6 +15,7 @@ from service.store import (
     estimates,
     journal,
     references,
+    runs,
     tracks,
     trainings,
     webhooks,
@@ -27,6 +28,7 @@ log = logging.getLogger("surefoot.jobs")
 BITE = 500  # rows: posts wait for the write lock no longer than these take
 _PAUSE_S = 0.02  # between bites: who waits for the write lock gets it
 _KEPT_MODELS = 2
+_RUN_HOURS = timedelta(days=7)
 _PAGES_AT_ONCE = 2_000
 _PAGES_LEFT = 256  # a megabyte, which the next hour fills again
 
@@ -92,6 +94,7 @@ def limits_of_all(settings: Settings) -> Iterator[Limit]:
     yield Limit("activity", lambda s: journal.forget_activity(s, done, BITE))
     yield Limit("deliveries_given_up", lambda s: webhooks.give_up(s, patience, now, BITE))
     yield Limit("deliveries", lambda s: webhooks.forget(s, ended, BITE))
+    yield Limit("estimation_run_hours", lambda s: runs.forget(s, now - _RUN_HOURS, BITE))
     yield Limit("old_secrets", lambda s: webhooks.forget_old_secrets(s, now, BITE))
 
 

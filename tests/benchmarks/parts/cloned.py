@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from sqlalchemy import Column, Table
 
+from models.geometry.pose import CameraPose
 from models.tracks.trajectory import Trajectory, by_end
 from service.commands.migrate import migrate
 from service.settings import Settings
@@ -42,11 +43,11 @@ _TABLES = (
 _TRACK_IDS = ("looked_at_pk", "newest_track_pk")  # they name tracks without a foreign key
 
 
-def people(site: int, count: int) -> list[Trajectory]:
-    """Walks at one of the simulated streets, from the same lanes every time."""
+def people(site: int, count: int, pose: CameraPose = PRIOR) -> list[Trajectory]:
+    """Walks at one of the simulated streets, from the same lanes for each pose of the camera."""
     rng, config = np.random.default_rng(site), SiteConfig()
     lanes = draw_lanes(LENS, PRIOR, config, rng)
-    return by_end(walk_site(LENS, PRIOR, lanes, config, count, rng))
+    return by_end(walk_site(LENS, pose, lanes, config, count, rng))
 
 
 def as_posted(walk: Trajectory, track_id: str, ended_s: float) -> dict[str, Any]:
