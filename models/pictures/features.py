@@ -41,7 +41,9 @@ def _first() -> KnownTurn:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Features:
-    """Features of a picture of `width` x `height` pixels: no picture can be made of them again.
+    """Features of an image of `width` x `height` pixels.
+
+    No pixels are kept, but outlines of the scene can be reconstructed from descriptors.
 
     Points (N, 2) are pixels, float32; descriptors (N, 128) SIFT's, as their square roots, uint8.
     `analysed` is the share to which the picture was scaled down before: places are as good as its
