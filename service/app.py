@@ -8,8 +8,8 @@ from typing import TypedDict
 from fastapi import FastAPI
 
 from service.api import (
+    actions,
     activity,
-    acts,
     aim,
     alerts,
     bridges,
@@ -127,7 +127,7 @@ def create_app(settings: Settings) -> FastAPI:
         zones,
         trainings,
         alerts,
-        acts,
+        actions,
         maintenance,
         webhooks,
         events,

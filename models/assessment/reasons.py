@@ -67,4 +67,4 @@ def reason_of_slow_drift(creep: Creep) -> Reason | None:
         "statistic": creep.statistic,
         "level": creep.level,
     }
-    return Reason(code=TracksCode.CREPT, values=values)
+    return Reason(code=TracksCode.SLOW_DRIFT, values=values)

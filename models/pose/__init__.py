@@ -31,8 +31,8 @@ from models.pose.picture import (
     with_picture,
 )
 from models.pose.pose_fit import (
+    Alternative,
     FusedEstimate,
-    Rival,
     WarmStart,
     warm_start_from_bytes,
     warm_start_to_bytes,
@@ -98,7 +98,7 @@ __all__ = [
     "pose_posterior",
     "Hypothesis",
     "PEOPLE",
-    "Rival",
+    "Alternative",
     "SelfCalibration",
     "self_calibrate",
     "smallest_told",

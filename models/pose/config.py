@@ -24,8 +24,8 @@ SHARED = 3  # parameters that speeds and places both determine, tilt, roll, heig
 # What a fused estimate needs, and says.
 FEWEST_GROUPS = 5  # walking groups: of fewer, places have no part
 BY_CHANCE = 0.01  # of still cameras seem turned in tilt or roll: else changed paths are a clock's
-RIVAL = 0.05  # odds against the best from which another pose is named
-NO_RIVAL = 1e-6  # odds below which another pose is not even begun at next time
+ALTERNATIVE = 0.05  # odds against the best from which another pose is named
+NO_ALTERNATIVE = 1e-6  # odds below which another pose is not even begun at next time
 
 # A change of the pose within a window.
 FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their own

@@ -14,12 +14,12 @@ from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     POSE_FIELDS,
+    AlternativeOut,
     Body,
     Moment,
     Out,
     ReasonCode,
     ReasonValues,
-    RivalOut,
     SinceOut,
     Text,
     Who,
@@ -106,14 +106,14 @@ class AlertOut(BaseModel):
 
 
 # Of an activity, `alert.silenced` say, the act alone.
-Act = Annotated[AlertActivity, BeforeValidator(lambda what: what.partition(".")[2])]
+Action = Annotated[AlertActivity, BeforeValidator(lambda what: what.partition(".")[2])]
 
 
-class ActOut(Out):
+class ActionOut(Out):
     """What somebody did with an alert; without a name, the service by itself."""
 
     at: datetime
-    act: Act = Field(validation_alias="what")
+    action: Action = Field(validation_alias="what")
     by: str | None
     until: datetime | None
     outcome: Outcome | None
@@ -137,7 +137,7 @@ class MovedZoneOut(BaseModel):
     false_counts: int | None
 
 
-class MendedZonesOut(BaseModel):
+class CorrectedZonesOut(BaseModel):
     """Where zones are as they should lie now, in the form that they came in, and what to do."""
 
     path: str
@@ -149,8 +149,8 @@ class AlertDetail(AlertOut):
     """An alert, what its move is to zones, and what was done with it, oldest first."""
 
     zones: list[MovedZoneOut] | None
-    mended_zones: MendedZonesOut | None
-    acts: list[ActOut] = []
+    corrected_zones: CorrectedZonesOut | None
+    acts: list[ActionOut] = []
 
 
 class AlertList(BaseModel):
@@ -217,7 +217,7 @@ class EvidenceOut(BaseModel):
     offset_sd: OffsetSdOut
     registered: bool
     prior_loss_sd: float
-    rivals: list[RivalOut]
+    alternatives: list[AlternativeOut]
     chart: ChartOut | None
     creep: StatisticOut | None
 
@@ -317,7 +317,7 @@ def list_all(
 @router.get("/{alert_id}")
 def show(alert_id: str, session: ReadDep) -> AlertDetail:
     """An alert, and what was done with it."""
-    return _with_acts(session, alerts.show_alert(session, alert_id))
+    return _with_actions(session, alerts.show_alert(session, alert_id))
 
 
 @router.get("/{alert_id}/evidence")
@@ -334,7 +334,7 @@ def acknowledge(
     said = body or AcknowledgeBody()
     by = name_in(session, said.by)
     record = alerts.acknowledge_alert(session, alert_id, by, acknowledged=said.acknowledged)
-    return _with_acts(session, record)
+    return _with_actions(session, record)
 
 
 @router.post("/{alert_id}/silence")
@@ -345,7 +345,7 @@ def silence_one(
     record = silence.silence_alert(
         session, state.settings, alert_id, body.until, body.reason, name_in(session, body.by)
     )
-    return _with_acts(session, record)
+    return _with_actions(session, record)
 
 
 @router.post("/{alert_id}/resolve")
@@ -355,9 +355,9 @@ def resolve(alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep
     record = decisions.resolve_alert(
         session, state.queue, state.settings, alert_id, body.outcome, body.note, by
     )
-    return _with_acts(session, record)
+    return _with_actions(session, record)
 
 
-def _with_acts(session: Session, record: AlertRecord) -> AlertDetail:
+def _with_actions(session: Session, record: AlertRecord) -> AlertDetail:
     acts = alerts.activity_of_alert(session, record.id)
     return AlertDetail.model_validate({**alert_body(record), "acts": acts})

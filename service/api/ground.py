@@ -69,9 +69,9 @@ class PixelOut(BaseModel):
 class HeldPoseOut(BaseModel):
     """A pose that held `since` a time.
 
-    Ellipses are of the numbers in `estimated`; the others are the prior pose's. Where the camera
-    has `drifted` and none is estimated, nobody knows where it stands. `pose` is null where nobody
-    has agreed to one.
+    Ellipses are of the numbers in `estimated`; the others are the prior pose's. If the camera
+    has `drifted` and none is estimated, its position is unknown. `pose` is null if no pose has
+    been confirmed.
     """
 
     drifted: bool

@@ -71,7 +71,7 @@ class HintOut(BaseModel):
     x_m: float | None
     y_m: float | None
     sd_m: float | None
-    off_sd: float | None
+    residual_sd: float | None
 
 
 class HintsOut(BaseModel):
@@ -84,7 +84,7 @@ class HintsOut(BaseModel):
     def from_value(cls, view: HintsView) -> Self:
         """The body of marks."""
         proposal = view.proposed
-        off = None if proposal is None else proposal.off_sd
+        off = None if proposal is None else proposal.residual_sd
         items = []
         for number, kept in enumerate(view.kept):
             x_m, y_m = kept.get("place_m", (None, None))
@@ -92,7 +92,7 @@ class HintsOut(BaseModel):
                 HintOut(
                     kind=kept["kind"], points=kept["points"], length_m=kept.get("length_m"),
                     x_m=x_m, y_m=y_m, sd_m=kept.get("place_sd_m"),
-                    off_sd=None if off is None else off[number],
+                    residual_sd=None if off is None else off[number],
                 )
             )  # fmt: skip
         return cls(

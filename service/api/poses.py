@@ -21,6 +21,7 @@ from service.api.middleware.dependencies import (
 from service.api.middleware.pages import REVALIDATED
 from service.api.schemas import (
     POSE_FIELDS,
+    AlternativeOut,
     Body,
     Moment,
     Out,
@@ -29,7 +30,6 @@ from service.api.schemas import (
     ReasonCode,
     ReasonValues,
     ReferenceOut,
-    RivalOut,
     SinceOut,
     Who,
 )
@@ -61,7 +61,7 @@ class AcceptBody(_DecisionBody):
     """Who accepts the served pose as the new prior pose, and why."""
 
 
-class AgreeBody(_DecisionBody):
+class ConfirmBody(_DecisionBody):
     """Who agrees to the pose that people told of a camera without a prior pose."""
 
 
@@ -115,7 +115,7 @@ class ProposedOut(BaseModel):
     pose: PoseOut
     sd: SdOut
     tracks: int
-    can_be_agreed: bool
+    can_be_confirmed: bool
     updated_at: datetime
 
     @classmethod
@@ -126,7 +126,7 @@ class ProposedOut(BaseModel):
             pose=PoseOut.from_value(proposal.pose),
             sd=SdOut(**sd),
             tracks=proposal.tracks,
-            can_be_agreed=proposal.told,
+            can_be_confirmed=proposal.told,
             updated_at=proposal.updated_at,
         )
 
@@ -145,8 +145,8 @@ class ServedPoseOut(BaseModel):
     drift: DriftOut | None
     moved: float | None
     moved_parameters: dict[str, float | None]
-    rivals: list[RivalOut]
-    would_notice: dict[str, dict[int, float] | None]
+    alternatives: list[AlternativeOut]
+    detectable: dict[str, dict[int, float] | None]
     since: SinceOut
     estimates: dict[str, Any]
     reference: ReferenceOut
@@ -179,8 +179,10 @@ class ServedPoseOut(BaseModel):
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             moved=None if estimate is None else estimate.moved,
             moved_parameters=_moved_parameters(estimate),
-            rivals=[] if estimate is None else in_degrees({"rivals": estimate.rivals})["rivals"],
-            would_notice=_would_notice(estimate),
+            alternatives=[]
+            if estimate is None
+            else in_degrees({"alternatives": estimate.alternatives})["alternatives"],
+            detectable=_detectable(estimate),
             since=SinceOut(
                 after=None if estimate is None else estimate.drift_after,
                 before=None if estimate is None else estimate.drift_since,
@@ -254,9 +256,9 @@ def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float | None
     return {field: shares.get(name) for name, field in POSE_FIELDS.items()}
 
 
-def _would_notice(estimate: EstimateRecord | None) -> dict[str, dict[int, float] | None]:
+def _detectable(estimate: EstimateRecord | None) -> dict[str, dict[int, float] | None]:
     """The smallest move of each number that so many people would tell; None where none is."""
-    known = {} if estimate is None else in_degrees(estimate.would_notice)
+    known = {} if estimate is None else in_degrees(estimate.detectable)
     return {
         field: None
         if known.get(field) is None
@@ -321,7 +323,7 @@ def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
 def _file(session: Session, view: PoseView, kind: PoseFormat, origin: GeoOrigin | None) -> Response:
     camera_id, estimate = view.status.camera_id, view.status.estimate
     if not view.calibrated:
-        raise ConflictError("pose: nobody has agreed to a prior pose yet")
+        raise ConflictError("pose: no prior pose has been confirmed yet")
     file = pose_file(
         kind,
         cameras.require_camera(session, camera_id).intrinsics,
@@ -367,12 +369,12 @@ def history(
     return History(items=[HistoryPoint.from_record(record) for record in records])
 
 
-@router.post("/pose/agree")
-def agree(
-    camera_id: str, state: StateDep, session: WriteDep, body: AgreeBody | None = None
+@router.post("/pose/confirm")
+def confirm(
+    camera_id: str, state: StateDep, session: WriteDep, body: ConfirmBody | None = None
 ) -> ServedPoseOut:
     """Make the pose that people told of a camera its prior pose, as sure as it is."""
-    return _decide(decisions.agree_pose, state, session, camera_id, body)
+    return _decide(decisions.confirm_pose, state, session, camera_id, body)
 
 
 @router.post("/pose/accept")

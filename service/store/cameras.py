@@ -105,7 +105,7 @@ class CameraRecord(Record):
 
 
 _ORIGINS = (
-    Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED, Origin.ASSUMED, Origin.AGREED
+    Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED, Origin.ASSUMED, Origin.CONFIRMED
 )  # fmt: skip
 
 
@@ -147,7 +147,7 @@ class PriorPoseRecord(Record):
 
     @property
     def assumed(self) -> bool:
-        """True of one that nobody has said or agreed to."""
+        """True if the pose was neither given nor confirmed."""
         return self.origin == Origin.ASSUMED
 
     @property
@@ -157,10 +157,10 @@ class PriorPoseRecord(Record):
 
 
 class ProposedPoseRecord(Record):
-    """The pose that people told of a camera whose prior pose is assumed; the newest look's.
+    """The newest estimated pose of a camera whose prior pose is assumed.
 
-    `covariance` (3, 3) is of tilt, roll and log height; `identifiable` names those of the three
-    that are known well enough to be agreed to.
+    `covariance` (3, 3) is of tilt, roll and log height; `identifiable` names the
+    parameters that are certain enough to be confirmed.
     """
 
     __tablename__ = "proposed_poses"
@@ -336,7 +336,7 @@ def proposed_pose(session: Session, prior_pose_id: int) -> ProposedPoseRecord | 
 def prior_pose_at(session: Session, camera_id: str, at: datetime) -> PriorPoseRecord:
     """The pose that a camera was trusted to have at a time; its first one before all of them.
 
-    One that is assumed is there alone where nobody has ever agreed to one.
+    An assumed pose is returned only if no pose was ever given or confirmed.
     """
     query = newest_first(PriorPoseRecord, camera_id)
     trusted = query.where(PriorPoseRecord.origin != Origin.ASSUMED)

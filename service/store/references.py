@@ -75,7 +75,7 @@ class SiteReferenceRecord(Record):
     ready_at: Mapped[datetime | None]
 
     __table_args__ = (
-        one_of("answer", (Answer.PUT_BACK, Answer.MENDED, Answer.FALSE_ALARM)),
+        one_of("answer", (Answer.PUT_BACK, Answer.FIXED, Answer.FALSE_ALARM)),
         Index(None, "camera_id", "id"),
         {"sqlite_autoincrement": True},  # an id is never given twice
     )

@@ -1,7 +1,7 @@
 """The words of pages for people who know no statistics; the docs' glossary has them from here."""
 
-from service.enums import Act, Answer
-from service.wording.acts import ACTS
+from service.enums import Action, Answer
+from service.wording.actions import ACTIONS
 from service.wording.language import N_
 
 WORDS = {
@@ -35,8 +35,8 @@ WORDS = {
             "People are still being counted to learn what is usual there. Nothing is judged yet."
         ),
         N_("Uncalibrated"): N_(
-            "Nobody has said how high it hangs and where it looks. The people before it tell,"
-            " and somebody has to agree to that."
+            "The camera has no prior pose. Its pose is estimated from the first tracks, and an"
+            " operator has to confirm it."
         ),
         N_("Unconnected"): N_("No track was ever posted for it, and no image was compared."),
     },
@@ -47,8 +47,8 @@ WORDS = {
         N_("Height"): N_("From the ground that people walk on to the camera."),
         N_("Pose"): N_("These four together, and where on the ground it stands."),
         N_("Prior pose"): N_(
-            "The pose that was trusted last: said when the camera was added, agreed to, or "
-            "kept after a move. Moves are told against it."
+            "The pose that moves are measured against: given at registration, confirmed, or "
+            "accepted after a move."
         ),
         N_("Drift"): N_(
             "How far it stands off its prior pose, after what is usual there was taken off."
@@ -81,13 +81,13 @@ WORDS = {
         ),
     },
     N_("What is done"): {
-        N_("It was put back"): ACTS[Answer.PUT_BACK].means,
-        N_("Keep the new aim"): ACTS[Answer.ACCEPTED].means,
-        N_("It was put right"): ACTS[Answer.MENDED].means,
-        N_("Acknowledge"): ACTS[Act.ACKNOWLEDGE].means,
-        N_("Silence"): ACTS[Act.SILENCE].means,
-        N_("Maintenance"): ACTS[Act.MAINTENANCE].means,
-        N_("Learn anew at the old aim"): ACTS[Act.RESET].means,
-        N_("Site and tags"): ACTS[Act.TAG].means,
+        N_("It was put back"): ACTIONS[Answer.PUT_BACK].means,
+        N_("Keep the new aim"): ACTIONS[Answer.ACCEPTED].means,
+        N_("Fixed"): ACTIONS[Answer.FIXED].means,
+        N_("Acknowledge"): ACTIONS[Action.ACKNOWLEDGE].means,
+        N_("Silence"): ACTIONS[Action.SILENCE].means,
+        N_("Maintenance"): ACTIONS[Action.MAINTENANCE].means,
+        N_("Learn anew at the old aim"): ACTIONS[Action.RESET].means,
+        N_("Site and tags"): ACTIONS[Action.TAG].means,
     },
 }

@@ -138,7 +138,7 @@ def test_credentials_without_an_address_are_rejected(http):
         ({"user": "seecret:x", "password": "y"}, "a user without a colon"),
         ({"user": "viewer", "password": "seecret\n"}, "printable characters"),
         ({"user": "", "password": "seecret"}, "1 to 200 characters are needed, got 0"),
-        ({"password": "seecret"}, "Field required"),
+        ({"password": "seecret"}, "is required"),
         ("seecret", ""),
     ],
 )

@@ -198,7 +198,7 @@ def test_a_creep_is_told_and_the_pose_is_by_the_first_map(known):
         turned += 0.5
     (alert,) = known.alerts(state="firing")
     assert alert["kind"] == "drift"
-    assert alert["reason_code"] == "crept"
+    assert alert["reason_code"] == "slow_drift"
     assert "has crept by +" in alert["reason"]
     assert alert["reason_values"]["number"] == "heading"
     assert turned < 2.5
