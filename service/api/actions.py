@@ -86,10 +86,11 @@ router = APIRouter(tags=["alerts"], route_class=NamingRoute)
 
 
 @router.post("/actions")
-def act(body: ActionsBody, state: StateDep, write: WritesDep) -> ActionsOut:
-    """Do one act with many alerts or cameras. Each is a transaction: what one refuses stops none.
+def run_action(body: ActionsBody, state: StateDep, write: WritesDep) -> ActionsOut:
+    """Apply an action to many alerts or cameras.
 
-    `acknowledge`, `silence` and `resolve` take ids of alerts, all others ids of cameras.
+    `acknowledge`, `silence` and `resolve` take ids of alerts, all others ids of cameras. Each id
+    is a transaction of its own: an error for one does not stop the others.
     """
     begun, undoable = datetime.now(UTC), dict[str, datetime]()
 

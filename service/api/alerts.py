@@ -286,7 +286,7 @@ router = APIRouter(prefix="/alerts", tags=["alerts"], route_class=NamingRoute)
 
 
 @router.get("", response_model=AlertList, responses={200: {"content": {CSV: {}}}})
-def list_all(
+def list_alerts(
     request: Request,
     session: ReadDep,
     chosen: ChosenDep,
@@ -295,7 +295,10 @@ def list_all(
     ] = None,
     limit: Annotated[int | None, Query(ge=1, le=10_000, description="1,000 of JSON")] = None,
 ) -> AlertList | Response:
-    """Alerts, newest first: 100 a page if unsaid, of CSV 10,000. A browser is led to the page."""
+    """List the alerts, newest first.
+
+    A page has 100 by default, a CSV file 10,000. A browser is redirected to the page of alerts.
+    """
     if format_ == FileFormat.CSV:
         found = map(alert_body, alerts.list_alerts(session, chosen, limit or _MOST_LINES))
         lines = csv_lines([_COLUMNS, *([body[name] for name in _COLUMNS] for body in found)])
@@ -315,22 +318,28 @@ def list_all(
 
 
 @router.get("/{alert_id}")
-def show(alert_id: str, session: ReadDep) -> AlertDetail:
-    """An alert, and what was done with it."""
+def get_alert(alert_id: str, session: ReadDep) -> AlertDetail:
+    """Get an alert with the actions on it."""
     return _with_actions(session, alerts.show_alert(session, alert_id))
 
 
 @router.get("/{alert_id}/evidence")
-def evidence(alert_id: str, session: ReadDep) -> EvidenceOut:
-    """What the newest estimate behind an alert was by."""
+def get_alert_evidence(alert_id: str, session: ReadDep) -> EvidenceOut:
+    """Get the evidence of an alert.
+
+    It comes from the newest estimate that supports the alert.
+    """
     return EvidenceOut.from_value(alerts.evidence_of_alert(session, alert_id))
 
 
 @router.post("/{alert_id}/acknowledge")
-def acknowledge(
+def acknowledge_alert(
     alert_id: str, session: WriteDep, body: AcknowledgeBody | None = None
 ) -> AlertDetail:
-    """Note who looks after an alert, or that they do no more."""
+    """Acknowledge an alert.
+
+    `acknowledged` false takes the acknowledgement back.
+    """
     said = body or AcknowledgeBody()
     by = name_in(session, said.by)
     record = alerts.acknowledge_alert(session, alert_id, by, acknowledged=said.acknowledged)
@@ -338,10 +347,13 @@ def acknowledge(
 
 
 @router.post("/{alert_id}/silence")
-def silence_one(
+def silence_alert(
     alert_id: str, body: SilenceBody, state: StateDep, session: WriteDep
 ) -> AlertDetail:
-    """Silence an alert until a time, in place of the silence it may have; null ends that."""
+    """Silence an alert until a time.
+
+    The new end replaces an earlier one; null ends the silence.
+    """
     record = silence.silence_alert(
         session, state.settings, alert_id, body.until, body.reason, name_in(session, body.by)
     )
@@ -349,8 +361,13 @@ def silence_one(
 
 
 @router.post("/{alert_id}/resolve")
-def resolve(alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep) -> AlertDetail:
-    """End an alert with what came of it; `accepted` accepts the served pose, as `pose/accept`."""
+def resolve_alert(
+    alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep
+) -> AlertDetail:
+    """Resolve an alert with an outcome.
+
+    `accepted` accepts the served pose, as `pose/accept` does.
+    """
     by = name_in(session, body.by)
     record = decisions.resolve_alert(
         session, state.queue, state.settings, alert_id, body.outcome, body.note, by

@@ -104,17 +104,23 @@ router = APIRouter(prefix="/cameras/{camera_id}/hints", tags=["pose"], route_cla
 
 
 @router.get("")
-def show(camera_id: str, session: ReadDep) -> HintsOut:
-    """The marks, how far each is off, and the pose that is proposed by them."""
+def get_hints(camera_id: str, session: ReadDep) -> HintsOut:
+    """Get the hints of a camera.
+
+    Each has its residual, and the answer has the pose that is proposed.
+    """
     return HintsOut.from_value(hints.view_hints(session, camera_id))
 
 
 @router.put("")
-def put(
+def put_hints(
     camera_id: str,
     body: Annotated[list[HintBody], Body(max_length=_MOST)],
     session: WriteDep,
 ) -> HintsOut:
-    """Keep marks in place of those there were; none takes all of them back."""
+    """Replace the hints of a camera.
+
+    An empty list removes them.
+    """
     kept = [each.kept() for each in body]
     return HintsOut.from_value(hints.keep_hints(session, camera_id, kept))

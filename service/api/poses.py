@@ -289,7 +289,7 @@ _FILES: dict[str, Any] = {kind: {} for kind in sorted(set(MEDIA_TYPES.values()))
 
 
 @router.get("/pose", response_model=ServedPoseOut, responses={200: {"content": _FILES}})
-def show(
+def get_pose(
     camera_id: str,
     state: StateDep,
     session: ReadDep,
@@ -299,9 +299,10 @@ def show(
     origin_lon_deg: _Longitude = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> ServedPoseOut | Response:
-    """The pose now, how sure it is, and why the state is what it is; or a file of another tool's.
+    """Get the pose of a camera.
 
-    What each of the files holds and leaves out is in the guide to formats.
+    The answer has its uncertainty and the reason for the state. With `format`, it is a file for
+    another tool; the guide to formats lists what each file holds.
     """
     view = poses.view_pose(session, state.settings, camera_id)
     headers = {"ETag": view.etag, **REVALIDATED}
@@ -314,8 +315,11 @@ def show(
 
 
 @router.get("/pose.yaml", response_class=_YamlResponse)
-def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
-    """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
+def get_pose_as_opencv_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
+    """Get the pose as an OpenCV YAML file.
+
+    The file has the lens and the homographies between ground and image.
+    """
     view = poses.view_pose(session, state.settings, camera_id)
     return _file(session, view, PoseFormat.OPENCV, None)
 
@@ -349,7 +353,7 @@ def _origin(lat_deg: float | None, lon_deg: float | None) -> GeoOrigin | None:
 
 
 @router.get("/pose/history")
-def history(
+def list_pose_history(
     camera_id: str,
     session: ReadDep,
     from_: Annotated[Moment | None, Query(alias="from")] = None,
@@ -357,9 +361,10 @@ def history(
     limit: Annotated[int | None, Query(ge=1, le=10_000)] = None,
     points: Annotated[int | None, Query(ge=2, le=10_000)] = None,
 ) -> History:
-    """The estimates between two times, oldest first: the newest `limit`, 1,000 if unsaid.
+    """List the estimates of a camera between two times.
 
-    With `points`, at most so many of all of them instead, evenly thinned out: for a chart.
+    They are ordered by time: the newest `limit` of them, 1,000 by default. With `points`, all
+    estimates are thinned out evenly to at most that number, for a chart.
     """
     if points is not None and limit is not None:
         raise MalformedError.of_field("points", "either limit or points is taken")
@@ -370,42 +375,57 @@ def history(
 
 
 @router.post("/pose/confirm")
-def confirm(
+def confirm_pose(
     camera_id: str, state: StateDep, session: WriteDep, body: ConfirmBody | None = None
 ) -> ServedPoseOut:
-    """Make the pose that people told of a camera its prior pose, as sure as it is."""
+    """Confirm the proposed pose.
+
+    It becomes the prior pose, with its uncertainty.
+    """
     return _decide(decisions.confirm_pose, state, session, camera_id, body)
 
 
 @router.post("/pose/accept")
-def accept(
+def accept_pose(
     camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
 ) -> ServedPoseOut:
-    """Make the served pose the new prior pose and close its alerts; a new reference begins."""
+    """Accept the served pose as the new prior pose.
+
+    The alerts about the pose are closed, and a new reference begins.
+    """
     return _decide(decisions.accept_pose, state, session, camera_id, body)
 
 
 @router.post("/pose/put-back")
-def put_back(
+def put_pose_back(
     camera_id: str, state: StateDep, session: WriteDep, body: PutBackBody | None = None
 ) -> ServedPoseOut:
-    """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
+    """Report that a camera is back at its prior pose.
+
+    The alerts about the pose are closed. The learned reference is kept.
+    """
     return _decide(decisions.put_back, state, session, camera_id, body)
 
 
 @router.post("/pose/undo")
-def undo(
+def undo_answer_about_pose(
     camera_id: str, state: StateDep, session: WriteDep, body: UndoBody | None = None
 ) -> ServedPoseOut:
-    """Take the last answer about the pose back, for 15 minutes and until something hangs on it."""
+    """Undo the last answer about the pose.
+
+    This is possible for 15 minutes, unless a later change depends on the answer.
+    """
     return _decide(undo_answer, state, session, camera_id, body)
 
 
 @router.post("/reference/reset")
-def reset(
+def reset_reference(
     camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
 ) -> ServedPoseOut:
-    """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
+    """Start a new reference at the prior pose.
+
+    The camera has to be at its prior pose. The alerts about the pose are closed.
+    """
     return _decide(decisions.learn_anew, state, session, camera_id, body)
 
 
