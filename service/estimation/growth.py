@@ -40,8 +40,8 @@ from service.references import (
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, windows
 from service.store.cameras import CameraRecord
-from service.store.look_budget import MAP_BUDGETS, LookBudget
 from service.store.references import AnchorRecord, FlowMapRecord, SiteReferenceRecord
+from service.store.run_budget import MAP_BUDGETS, RunBudget
 from service.store.tracks import StoredTrack
 from service.store.windows import StillBounds, WindowBounds
 
@@ -95,7 +95,7 @@ def load_growth(
         attended,
         judged,
         spoilt,
-        LookBudget(MAP_BUDGETS * unpacked.budget.share),
+        RunBudget(MAP_BUDGETS * unpacked.budget.share),
     )
     if found is None:
         return None
@@ -132,7 +132,7 @@ def _still_tracks(
     attended: Attendance,
     judged: WindowBounds,
     spoilt: bool,
-    budget: LookBudget,
+    budget: RunBudget,
 ) -> Sequence[StoredTrack] | None:
     """The tracks that are known to be of a still camera; None where too few of them are new.
 

@@ -372,7 +372,7 @@ def _frigate(settings: Settings, zones: ZonesView) -> str | None:
 def _flags(page: CameraPage, clock: Clock) -> list[str]:
     """Flags of open alerts and maintenance, each once."""
     until = None if page.attended is None else page.attended.to_at
-    flags = [*camera_words.page_flags(page.camera.record.lacks, until, clock)]
+    flags = [*camera_words.page_flags(page.camera.record.missing_parts, until, clock)]
     for story in page.firing:
         flags += camera_words.page_alert_flags(story.record, story.group, clock)
     return list(dict.fromkeys(flags))

@@ -260,12 +260,12 @@ def fleet_line(
 
 
 def page_flags(
-    lacks: Sequence[Reason], attended_until: datetime | None, clock: Clock
+    missing_parts: Sequence[Reason], attended_until: datetime | None, clock: Clock
 ) -> Sequence[str]:
     """Flags of a camera's page, beside those of its alerts."""
     found = [
         _("Without the {part}", part=str(lack.values["part"]).replace("_", " "))
-        for lack in lacks
+        for lack in missing_parts
         if lack.code == ServiceCode.WITHOUT_PART
     ]
     if attended_until is not None:

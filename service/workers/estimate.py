@@ -9,13 +9,13 @@ from models.effort import limited_effort
 from models.errors import CheckpointError
 from models.tracks.image_size import doubt_image_size
 from service.estimate_queue import (
-    begin_look,
     budget_of,
-    end_look,
-    fail_look,
+    fail_run,
+    finish_run,
     leave_poisoned,
     note_partial_failures,
     skipped_by,
+    start_run,
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
 from service.estimation.compute import ComputedEstimate, compute_estimate
@@ -34,7 +34,7 @@ from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
 from service.estimation.seen_picture import ask_in_doubt
 from service.store.estimates import EstimateRecord
-from service.store.look_budget import LookBudget
+from service.store.run_budget import RunBudget
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
 
@@ -54,14 +54,14 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
             return
         # The mark "due" goes first: tracks that arrive from then on ask for a look of their own.
-        newest_pk, asked = begin_look(session, camera_id)
+        newest_pk, asked = start_run(session, camera_id)
         budget = budget_of(session, camera_id)
     try:
         with limited_effort(context.settings.estimate_cpu_s):
             _look(context, camera_id, newest_pk, budget, asked=asked)
     except Exception as error:
         with context.store.write(camera_id) as session:
-            fail_look(session, camera_id, repr(error))
+            fail_run(session, camera_id, repr(error))
         raise
 
 
@@ -69,7 +69,7 @@ def _look(
     context: JobContext,
     camera_id: str,
     newest_pk: int | None,
-    budget: LookBudget,
+    budget: RunBudget,
     *,
     asked: bool,
 ) -> None:
@@ -82,7 +82,7 @@ def _look(
     if propose_if_uncalibrated(context, camera_id, unpacked):
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
+            finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
         return
     failures.unless_failed("picture", partial(compare_if_due, context, camera_id))
     missing = predict_pending(context, camera_id, unpacked)
@@ -91,7 +91,7 @@ def _look(
     if not learn_if_due(context, camera_id, unpacked):
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
+            finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
         return
     failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
     with store.read() as session:
@@ -110,7 +110,7 @@ def _look(
             _log_estimate(save_by_picture(session, settings, camera_id))
         cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        end_look(
+        finish_run(
             session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
         )
     if not isinstance(found, Monitored):
