@@ -146,7 +146,7 @@ class SeenTrack:
 class Anchor:
     """The first map and chart of a reference, and its log of whole days.
 
-    The log counts from `from_s` on: since then the camera has stood as it does, but for a creep.
+    The log counts from `from_s` on: since then the camera has moved only by slow drift.
     """
 
     record: AnchorRecord

@@ -11,18 +11,18 @@ from datetime import UTC, datetime
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.assessment import without_creep
+from models.assessment import without_slow_drift
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.pose import (
     FEWEST_BESIDE,
-    creep_log_from_bytes,
     learn_site,
     observe,
     paths_from_bytes,
     reference_from_bytes,
+    slow_drift_log_from_bytes,
 )
 from models.tracks.trajectory import Trajectory
 from service.estimation.anchoring import LearnedPaths, keep_paths, paths_of
@@ -169,8 +169,10 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     trajectories, weights = period.trajectories, period.weights
     anchor = period.anchor
     if anchor is not None and anchor.record.creep is not None:
-        log = creep_log_from_bytes(anchor.record.creep)
-        stood = without_creep(trajectories, period.intrinsics, period.prior, log, anchor.from_s)
+        log = slow_drift_log_from_bytes(anchor.record.creep)
+        stood = without_slow_drift(
+            trajectories, period.intrinsics, period.prior, log, anchor.from_s
+        )
         # Some have lost their ends by that: another order.
         ends = {n: track.time_s[-1] for n, track in enumerate(stood) if track is not None}
         order = sorted(ends, key=ends.__getitem__)

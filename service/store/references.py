@@ -183,7 +183,7 @@ class AnchorRecord(Record):
     """The first flow map and drift chart of a reference: they never grow (`models.pose`).
 
     `flow` and `chart` are of tracks of which the last ended at `to_s`. `creep` is the log of whole
-    days since (`models.monitoring.creep`), up to `logged_to_s`; None as long as there is none.
+    days since (`models.monitoring.slow_drift`), up to `logged_to_s`; None as long as there is none.
     """
 
     __tablename__ = "anchors"

@@ -142,8 +142,9 @@ def _chart(v: _Values) -> str:
 def _slow_drift(v: _Values) -> str:
     said = {"number": _number(v), "since": datetime.fromisoformat(v["since"]).astimezone(v["zone"])}
     return _(
-        "has crept by {by_deg:+.1f} deg (sd {sd_deg:.1f}) in {number} since {since:%Y-%m-%d}, by "
-        "the first map and speeds of its reference (creep: {statistic:.0f}, alarm at {level:.0f})",
+        "has drifted slowly by {by_deg:+.1f} deg (sd {sd_deg:.1f}) in {number} since "
+        "{since:%Y-%m-%d}, relative to the first map and speeds of its reference "
+        "(score {statistic:.0f}, alarm at {level:.0f})",
         **{**v, **said},
     )
 

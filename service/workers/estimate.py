@@ -93,7 +93,7 @@ def _look(
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
             finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
         return
-    failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
+    failures.unless_failed("anchor", partial(log_slow_drift_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked, asked=asked)
     if skipped := skipped_by(budget):
@@ -214,7 +214,7 @@ def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> boo
     return True
 
 
-def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+def log_slow_drift_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Hold the whole days that have come since the last time against a camera's anchor."""
     with context.store.read() as session:
         days = load_anchor_days(session, context.settings, camera_id, unpacked)
@@ -224,7 +224,7 @@ def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) ->
     with context.store.write(camera_id) as session:
         save_anchor_days(session, days, logged)
     fields = {"camera_id": camera_id, "tracks": len(days.trajectories)}
-    log.info("creep_logged", extra=fields)
+    log.info("slow_drift_logged", extra=fields)
 
 
 def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:

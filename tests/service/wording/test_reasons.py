@@ -60,8 +60,8 @@ SAID = [
      "(drift chart: 30, alarm at 9)"),
     (T.SLOW_DRIFT, {"number": "heading", "by_rad": math.radians(1.24), "sd_rad": math.radians(0.3),
                "since": "2026-08-20T07:12:00+00:00", "statistic": 17.2, "level": 14.4},
-     "has crept by +1.2 deg (sd 0.3) in heading since 2026-08-20, by the first map and speeds of "
-     "its reference (creep: 17, alarm at 14)"),
+     "has drifted slowly by +1.2 deg (sd 0.3) in heading since 2026-08-20, relative to the first "
+     "map and speeds of its reference (score 17, alarm at 14)"),
     (T.SCALE_CHANGED, {"factor": 1.2, "rate_hz": 25.0},
      "the scale has changed by +20 % and the angles have not: as if 30 frames a second were taken "
      "for 25, or the camera was raised"),
