@@ -25,7 +25,7 @@ class TracksCode(StrEnum):
     BEYOND_LIMITS_LAST_IDENTIFIABLE = "beyond_limits_last_told"
     WITHIN_LIMITS = "within_limits"
     CHART = "chart"
-    CREPT = "crept"
+    SLOW_DRIFT = "slow_drift"
     SCALE_CHANGED = "scale_changed"
     LENS_CHANGED = "lens_changed"
     PATHS_CHANGED = "paths_changed"

@@ -8,8 +8,8 @@ from typing import TypedDict
 from fastapi import FastAPI
 
 from service.api import (
+    actions,
     activity,
-    acts,
     aim,
     alerts,
     bridges,
@@ -105,7 +105,7 @@ def create_app(settings: Settings) -> FastAPI:
     app = FastAPI(
         title="surefoot",
         version=version("surefoot"),
-        summary="Tells when a fixed camera has moved, from the paths of people walking.",
+        summary="Detects from pedestrian tracks that a fixed camera has moved.",
         lifespan=lifespan,
         docs_url=None,  # FastAPI's own fetch their viewers from a public host
         redoc_url=None,
@@ -127,7 +127,7 @@ def create_app(settings: Settings) -> FastAPI:
         zones,
         trainings,
         alerts,
-        acts,
+        actions,
         maintenance,
         webhooks,
         events,
@@ -155,7 +155,7 @@ def create_app(settings: Settings) -> FastAPI:
         language,
     ):
         app.router.routes.extend(module.router.routes)
-    documented.document_errors(app)
+    documented.document_routes(app)
     pages.mount_static(app)
     # The last one is outermost.
     app.add_middleware(AdmissionMiddleware, settings=settings)

@@ -41,7 +41,7 @@ class Cause(StrEnum):
     REFERENCE = "reference"
     MAINTENANCE = "maintenance"
     PUT_BACK = "put_back"
-    MENDED = "mended"
+    FIXED = "fixed"
     FALSE_ALARM = "false_alarm"
 
 
@@ -60,14 +60,14 @@ class ReferenceState(StrEnum):
 
 
 class Origin(StrEnum):
-    """The beginning of a prior pose or a reference; prior poses know the first five.
+    """The origin of a prior pose or a reference; prior poses use the first five.
 
-    An assumed pose is nobody's word, but for what was measured of it; an agreed one was proposed of
-    the people before the camera.
+    An assumed pose is a default, except for the parameters that were measured. A confirmed pose
+    was estimated from tracks and confirmed by an operator.
     """
 
     ASSUMED = "assumed"
-    AGREED = "agreed"
+    CONFIRMED = "confirmed"
     REGISTERED = "registered"
     CHANGED = "changed"
     ACCEPTED = "accepted"
@@ -118,16 +118,16 @@ class Severity(StrEnum):
 
 
 class Answer(StrEnum):
-    """A person's answer on what an alert tells of; which of them there are hangs on its kind."""
+    """An operator's answer to an alert; the kind of the alert determines the possible ones."""
 
     PUT_BACK = "put_back"
     ACCEPTED = "accepted"
-    MENDED = "mended"
+    FIXED = "fixed"
     FALSE_ALARM = "false_alarm"
 
 
-class Act(StrEnum):
-    """What can be done with many: the first three with alerts, the others with cameras."""
+class Action(StrEnum):
+    """An action on many items at once: the first three on alerts, the others on cameras."""
 
     ACKNOWLEDGE = "acknowledge"
     SILENCE = "silence"
@@ -141,11 +141,11 @@ class Act(StrEnum):
 
 
 class Outcome(StrEnum):
-    """The outcome of an alert: a person's answer or act, or something by itself."""
+    """The outcome of an alert: an operator's answer, or the event that closed the alert."""
 
     PUT_BACK = Answer.PUT_BACK
     ACCEPTED = Answer.ACCEPTED
-    MENDED = Answer.MENDED
+    FIXED = Answer.FIXED
     RELEARNED = "relearned"
     FALSE_ALARM = Answer.FALSE_ALARM
     CLEARED = "cleared"
@@ -153,7 +153,7 @@ class Outcome(StrEnum):
 
 
 class AlertActivity(StrEnum):
-    """Acts on an alert."""
+    """An action on an alert."""
 
     OPENED = "opened"
     GREW = "grew"
@@ -258,10 +258,10 @@ class Activity(StrEnum):
     CAMERA_CHANGED = "camera.changed"
     CAMERA_DESCRIBED = "camera.described"
     CAMERA_REMOVED = "camera.removed"
-    POSE_AGREED = "pose.agreed"
+    POSE_CONFIRMED = "pose.confirmed"
     POSE_ACCEPTED = "pose.accepted"
     POSE_PUT_BACK = "pose.put_back"
-    POSE_MENDED = "pose.mended"
+    POSE_FIXED = "pose.fixed"
     POSE_FALSE_ALARM = "pose.false_alarm"
     POSE_UNDONE = "pose.undone"
     REFERENCE_RESET = "reference.reset"

@@ -131,7 +131,7 @@ class TooLargeError(ServiceError):
 
 
 class MalformedError(ServiceError):
-    """A body that cannot be read at all, or lacks or breaks a field."""
+    """A body that cannot be read at all, or has a missing or invalid field."""
 
     status, code = 422, "malformed"
 

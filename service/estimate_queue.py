@@ -9,7 +9,7 @@ from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode
 from service.store import estimates, tracks
 from service.store.cameras import CameraRecord
-from service.store.look_budget import LookBudget
+from service.store.run_budget import RunBudget
 
 LONGEST_COOLDOWN_S = 600.0
 _FIRST_COOLDOWN_S = 5.0
@@ -84,11 +84,11 @@ def leave_poisoned(session: Session, camera_id: str) -> bool:
     return True
 
 
-def begin_look(session: Session, camera_id: str) -> tuple[int | None, bool]:
-    """Take the mark "due" off a camera.
+def start_run(session: Session, camera_id: str) -> tuple[int | None, bool]:
+    """Start an estimation run of a camera, which is then no longer due.
 
     Returns:
-        The track that was stored last, and whether a full estimate is asked for.
+        The newest stored track, and whether a full estimate is requested.
     """
     camera, asked = session.get(CameraRecord, camera_id), False
     if camera is not None:
@@ -98,28 +98,28 @@ def begin_look(session: Session, camera_id: str) -> tuple[int | None, bool]:
             _note_failure(camera, _DIED, now)
         camera.estimate_due_at = None
         camera.estimate_tries += 1
-        # Should the worker die of it, this is all that is left to know it by.
+        # If the worker dies during the run, this is its only trace.
         camera.estimate_after = now + timedelta(seconds=cooldown_s(camera.estimate_tries))
     return tracks.newest_pk(session, camera_id), asked
 
 
-def budget_of(session: Session, camera_id: str) -> LookBudget:
-    """The budget of the look that has begun: less of one, after looks that were too much.
+def budget_of(session: Session, camera_id: str) -> RunBudget:
+    """The budget of the current run: a smaller one after runs that exceeded theirs.
 
-    As long as something is left out by a smaller one, it stays that small.
+    It stays small as long as tracks are skipped.
     """
     camera = session.get(CameraRecord, camera_id)
     if camera is None:
-        return LookBudget()
-    kept = (each.values["share"] for each in camera.lacks if each.code == _SKIPPED)
+        return RunBudget()
+    kept = (each.values["share"] for each in camera.missing_parts if each.code == _SKIPPED)
     share = next((value for value in kept if isinstance(value, float)), 1.0)
     if camera.estimate_error is not None and camera.estimate_error.startswith(_TOO_MUCH):
         share *= _NEXT_SHARE ** max(camera.estimate_tries - 1, 0)
-    return LookBudget(max(share, _LEAST_SHARE))
+    return RunBudget(max(share, _LEAST_SHARE))
 
 
-def skipped_by(budget: LookBudget) -> Reasons:
-    """A reason that names tracks which a look had no budget for; none where it had for all."""
+def skipped_by(budget: RunBudget) -> Reasons:
+    """The reason that names the tracks that a run skipped; empty if it skipped none."""
     if not budget.skipped:
         return ()
     names = list(dict.fromkeys(budget.skipped.values()))[:_NAMED]
@@ -131,7 +131,7 @@ def skipped_by(budget: LookBudget) -> Reasons:
     return (Reason(code=_SKIPPED, values=values),)
 
 
-def end_look(
+def finish_run(
     session: Session,
     camera_id: str,
     newest_pk: int | None,
@@ -139,30 +139,30 @@ def end_look(
     rest_s: float = 0.0,
     failures: Reasons = (),
 ) -> None:
-    """Note up to which track a job has looked; the reconcile sees what came after.
+    """Finish a run that has read the tracks up to `newest_pk`.
 
-    The camera cools down for `rest_s`, so that others have their turn. `failures` are of what
-    stands beside the served estimate.
+    No run of this camera starts for `rest_s`, so that other cameras have their turn. `failures`
+    are those beside the served estimate.
     """
     camera = session.get(CameraRecord, camera_id)
     if camera is not None:
-        if camera.looked_at_pk != newest_pk:
-            camera.looked_at_pk, camera.checked_at = newest_pk, _now()
+        if camera.read_track_pk != newest_pk:
+            camera.read_track_pk, camera.checked_at = newest_pk, _now()
         camera.estimate_tries = 0
         camera.estimate_error = camera.estimate_failing_since = None
         camera.estimate_after = _now() + timedelta(seconds=min(rest_s, LONGEST_COOLDOWN_S))
-        camera.lacks = failures
+        camera.missing_parts = failures
 
 
 def note_partial_failures(session: Session, camera_id: str, failures: Reasons) -> None:
-    """Note what failed beside an estimate after that was stored."""
+    """Add failures beside an estimate that is stored already."""
     camera = session.get(CameraRecord, camera_id)
     if camera is not None:
-        camera.lacks = (*camera.lacks, *failures)
+        camera.missing_parts = (*camera.missing_parts, *failures)
 
 
-def fail_look(session: Session, camera_id: str, error: str) -> None:
-    """Note that a look failed: the camera stays due, and cools down longer each time."""
+def fail_run(session: Session, camera_id: str, error: str) -> None:
+    """Record that a run failed: the camera stays due, with a longer cooldown each time."""
     camera = session.get(CameraRecord, camera_id)
     if camera is not None:
         now = _now()

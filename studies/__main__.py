@@ -162,7 +162,7 @@ def alarm_study(
     run_alarm_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
 
 
-def creep_study(
+def slow_drift_study(
     sites: Annotated[int, typer.Option(min=1, help="How many simulated cameras.")] = 20,
     still_days: Annotated[
         int, typer.Option(min=0, help="How long each stands, beside its creeps; 0: not at all.")
@@ -177,17 +177,17 @@ def creep_study(
     output: Annotated[Path, typer.Option(help="Where the JSON goes.")] = Path("creep-study.json"),
 ) -> None:
     """Simulated cameras that creep in tilt, roll or heading, or stand: when the anchor tells it."""
-    from studies.alarms.creep_run import run_creep_study
-    from studies.alarms.creep_years import CreepPlan
+    from studies.alarms.slow_drift_run import run_slow_drift_study
+    from studies.alarms.slow_drift_years import SlowDriftPlan
 
-    plan = CreepPlan(
+    plan = SlowDriftPlan(
         tracks_a_day=tracks_a_day,
         reference_tracks=reference_tracks,
         alarms_a_year=alarms_a_year,
         days=730,
         still_days=still_days,
     )
-    run_creep_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
+    run_slow_drift_study(sites=sites, seed=seed, plan=plan, processes=processes, output=output)
 
 
 def centred(
@@ -303,7 +303,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 for _command in (
-    evaluate, protocol, parts, http, flow_study, alarm_study, creep_study, centred, paper,
+    evaluate, protocol, parts, http, flow_study, alarm_study, slow_drift_study, centred, paper,
 ):  # fmt: skip
     app.command()(_command)
 

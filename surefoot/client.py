@@ -45,7 +45,7 @@ _SHORTEST_WAIT_S, _LONGEST_WAIT_S = 1.0, 60.0
 _CLOCK_S = 5.0  # that clocks may differ by without a word; a second of it is the header's own
 # Nothing is wrong with the tracks: they are posted again, once somebody has mended it.
 _NAME = re.compile(r"[0-9]{1,18}-[0-9]{1,9}\.json")  # number and tracks of a file
-_MAY_BE_MENDED = frozenset((401, 403, 404, 408, 409, 421, 425, 429))
+_FIXABLE = frozenset((401, 403, 404, 408, 409, 421, 425, 429))
 
 
 class _NoRedirect(urllib.request.HTTPRedirectHandler):
@@ -312,7 +312,7 @@ class Client:
             return 0.0
         if status != 202:
             said = body.decode("utf-8", "replace")
-            if status < 400 or status >= 500 or status in _MAY_BE_MENDED:
+            if status < 400 or status >= 500 or status in _FIXABLE:
                 log.warning("%s: %d %s; it is tried again", self._url, status, said)
                 asked = headers.get("Retry-After") or ""
                 return min(float(asked), _LONGEST_WAIT_S) if asked.isdigit() else 0.0

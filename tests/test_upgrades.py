@@ -45,7 +45,7 @@ CALLED = {
                "config": "{}", "metrics": "{}", "step_s": 0.4},
     "predictions": {"model_id": "m" * 32, "track_pk": 1, "windows": 0},
     "estimates": {"id": 1, "model_id": "m" * 32, "state": "ok", "raw": "{}", "told": '["tilt"]',
-                  "moved_parameters": "{}", "rivals": "[]", "would_notice": "{}",
+                  "moved_parameters": "{}", "alternatives": "[]", "detectable": "{}",
                   "suspected": 0, "reference_id": 1, "newest_track_pk": 1, "tracks": 1,
                   "covariance": str([[0.0] * 4] * 4), "from_s": NOW_S, "to_s": NOW_S + 8,
                   **NUMBERS},

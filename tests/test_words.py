@@ -77,6 +77,7 @@ OTHERS = {
     ("store/record.py", "source"): "the name of a column",
     ("store/tracks.py", "source"): "the name of a column",
     ("store/tracks.py", "tracks"): "the name of a table",
+    ("wording/alerts.py", "fixed"): "the text of the outcome",
     ("wording/typed_pose.py", "critical"): "a tone, defined there",
     ("wording/typed_pose.py", "warning"): "a tone, defined there",
 }

@@ -94,7 +94,7 @@ def seeded(settings: Settings) -> list[Case]:
         tilt = 2.0 + 0.02 * number
         cases.append(_case(number, fleet.knock(id_of(number), tilt_deg=tilt), right))
     for number in _CLOCKS:
-        cases.append(_case(number, fleet.knock(id_of(number), kind="clock"), ("mended",)))
+        cases.append(_case(number, fleet.knock(id_of(number), kind="clock"), ("fixed",)))
     far = fleet.knock(id_of(_FAR), kind="unsure", severity="warning")
     cases.append(_case(_FAR, far, (None,)))
     with fleet.store.write() as session:
@@ -104,7 +104,7 @@ def seeded(settings: Settings) -> list[Case]:
                 fleet.now - timedelta(hours=26), reasons=as_said("the newest track is 26 h old"),
             )  # fmt: skip
             assert alert is not None
-            cases.append(_case(number, alert.id, (None, "mended")))
+            cases.append(_case(number, alert.id, (None, "fixed")))
         for number in _TOGETHER:
             references.newest(session, id_of(number)).source = _TRACKER
             theirs = TrackRecord.camera_id == id_of(number)
@@ -113,7 +113,7 @@ def seeded(settings: Settings) -> list[Case]:
         fleet.knock(id_of(number), tilt_deg=2.5)
     with fleet.store.read() as session:
         (group,) = session.scalars(select(AlertRecord).where(AlertRecord.camera_id.is_(None)))
-        cases.append(Case(name=_TRACKER, alert_id=group.id, right=("mended", "false_alarm")))
+        cases.append(Case(name=_TRACKER, alert_id=group.id, right=("fixed", "false_alarm")))
     fleet.close()
     assert len(special) == len(cases) - 1 + len(_TOGETHER)
     return cases

@@ -24,10 +24,10 @@ TABLES = sa.MetaData(
 # SQLite's integers have as many bytes as they need, PostgreSQL's as they are said to.
 NUMBER = sa.BigInteger().with_variant(sa.Integer(), "sqlite")
 ALERT_KINDS = "drift no_data clock lens unsure stale tracker picture many_moved many_silent"
-OUTCOMES = "put_back accepted mended relearned false_alarm cleared camera_removed"
+OUTCOMES = "put_back accepted fixed relearned false_alarm cleared camera_removed"
 ACTIVITY = (
-    "camera.registered camera.changed camera.described camera.removed pose.agreed pose.accepted "
-    "pose.put_back pose.mended pose.false_alarm pose.undone reference.reset reference.learned "
+    "camera.registered camera.changed camera.described camera.removed pose.confirmed pose.accepted "
+    "pose.put_back pose.fixed pose.false_alarm pose.undone reference.reset reference.learned "
     "source.used source.removed alert.opened alert.grew alert.escalated alert.mailed "
     "alert.acknowledged alert.given_back alert.silenced alert.silence_ended alert.resolved "
     "alert.reopened maintenance.planned maintenance.changed maintenance.ended "
@@ -101,13 +101,13 @@ table(
     *needed(Double, "walking_speed_mean_mps", "walking_speed_sd_mps"),
     *needed(NUMBER, "reference_tracks", "version"),
     *optional(DateTime, "estimate_due_at"),
-    *optional(NUMBER, "looked_at_pk"),
+    *optional(NUMBER, "read_track_pk"),
     *optional(DateTime, "checked_at"),
     *needed(Boolean, "full_estimate_asked"),
     *needed(NUMBER, "estimate_tries"),
     *optional(String, "estimate_error"),
     *optional(DateTime, "estimate_failing_since", "estimate_after"),
-    *needed(JSON, "lacks"),
+    *needed(JSON, "missing_parts"),
     *optional(String, "snapshot_url"),
     *optional(DateTime, "snapshot_due_at"),
     *optional(String, "snapshot_error"),
@@ -126,7 +126,7 @@ table(
     *needed(JSON, "hints", "given"),
     *optional(JSON, "covariance"),
     *needed(DateTime, "created_at"),
-    one_of("origin", "registered changed accepted assumed agreed"),
+    one_of("origin", "registered changed accepted assumed confirmed"),
     Index(None, "camera_id", "id"),
     sqlite_autoincrement=True,
 )
@@ -235,8 +235,8 @@ table(
     *optional(DateTime, "answered_at"),
     *needed(DateTime, "created_at"),
     *optional(DateTime, "ready_at"),
-    one_of("origin", "assumed agreed registered changed accepted reset put_back source"),
-    one_of("answer", "put_back mended false_alarm"),
+    one_of("origin", "assumed confirmed registered changed accepted reset put_back source"),
+    one_of("answer", "put_back fixed false_alarm"),
     Index(None, "camera_id", "id"),
     sqlite_autoincrement=True,
 )
@@ -325,7 +325,7 @@ table(
     *needed(JSON, "covariance"),
     *needed(Double, "drift_height_m", "drift_tilt_rad", "drift_roll_rad"),
     *needed(Double, "drift_heading_rad", "drift_angle_rad", "moved"),
-    *needed(JSON, "moved_parameters", "rivals", "would_notice"),
+    *needed(JSON, "moved_parameters", "alternatives", "detectable"),
     *needed(Boolean, "suspected"),
     *needed(NUMBER, "drift_streak"),
     *needed(JSON, "drifted"),

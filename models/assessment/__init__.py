@@ -5,7 +5,7 @@ from models.assessment.decide import change_in, is_site_changed
 from models.assessment.monitor import AlarmRate, alarm_chart_result, tracks_a_year
 from models.assessment.observe import MOST_PIECES
 from models.assessment.reasons import reason_of_drift
-from models.assessment.slow_drift import begin_creep_log, log_creep, without_creep
+from models.assessment.slow_drift import begin_slow_drift_log, log_slow_drift, without_slow_drift
 from models.assessment.values import (
     NO_TIME,
     Assessment,
@@ -37,16 +37,16 @@ __all__ = [
     "Verdict",
     "alarm_chart_result",
     "assess",
-    "begin_creep_log",
+    "begin_slow_drift_log",
     "change_in",
     "conclude",
     "is_site_changed",
     "judge",
-    "log_creep",
+    "log_slow_drift",
     "may_be_alerted",
     "monitor",
     "next_state",
     "tracks_a_year",
     "reason_of_drift",
-    "without_creep",
+    "without_slow_drift",
 ]

@@ -27,7 +27,7 @@ from models.assessment.values import (
 )
 from models.errors import TooFewTrajectoriesError
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep
+from models.monitoring.slow_drift import SlowDrift
 from models.pose.estimating import (
     PartialFailure,
     PoseFinding,
@@ -75,7 +75,7 @@ class Monitored:
     site: CameraSite
     mapped: bool
     chart: ChartResult | None
-    slow_drift: Creep | None
+    slow_drift: SlowDrift | None
     failures: tuple[PartialFailure, ...] = ()
 
     @property
@@ -192,7 +192,7 @@ def conclude(
     observed: Observed,
     found: PoseFinding,
     chart: ChartResult | None = None,
-    slow_drift: Creep | None = None,
+    slow_drift: SlowDrift | None = None,
     *,
     mapped: bool,
     state: AssessmentState = FIRST_STATE,

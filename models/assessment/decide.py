@@ -24,8 +24,8 @@ from models.assessment.verdict import judge
 from models.durations import DAY_S
 from models.geometry.pose import ANGLES, PARAMETERS
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep
 from models.monitoring.drift import LIKELY
+from models.monitoring.slow_drift import SlowDrift
 from models.pose import config
 from models.pose.estimating import PoseFinding
 from models.pose.hypotheses import PosePosterior
@@ -38,7 +38,7 @@ def decide(
     observed: Observed,
     found: PoseFinding,
     chart: ChartResult | None,
-    slow_drift: Creep | None,
+    slow_drift: SlowDrift | None,
     *,
     mapped: bool,
     state: AssessmentState,
@@ -140,7 +140,7 @@ def _counting_chart(
 def _moved_at(
     observed: Observed,
     found: PoseFinding,
-    slow_drift: Creep | None,
+    slow_drift: SlowDrift | None,
     verdict: Verdict,
     camera: CameraState,
     state: AssessmentState,

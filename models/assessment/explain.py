@@ -5,7 +5,7 @@ from models.assessment.reasons import reason_of_chart, reason_of_drift, reason_o
 from models.assessment.values import AssessmentLimits, AssessmentState, Decision, Observed
 from models.geometry.pose import PLANE_PARAMETERS
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep
+from models.monitoring.slow_drift import SlowDrift
 from models.pose.estimating import PoseFinding
 from models.reasons import Reason, TracksCode
 
@@ -14,7 +14,7 @@ def explain(
     observed: Observed,
     found: PoseFinding,
     chart: ChartResult | None,
-    slow_drift: Creep | None,
+    slow_drift: SlowDrift | None,
     decision: Decision,
     *,
     state: AssessmentState,

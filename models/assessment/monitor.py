@@ -13,9 +13,9 @@ from models.assessment.values import AssessmentLimits, Observed
 from models.durations import DAY_S
 from models.geometry.rotation import Mask
 from models.monitoring.chart import ChartResult, chart_result
-from models.monitoring.config import CREEP_SHARE, RUN
-from models.monitoring.creep import Creep, creep_result
+from models.monitoring.config import RUN, SLOW_DRIFT_SHARE
 from models.monitoring.group_scores import score_groups
+from models.monitoring.slow_drift import SlowDrift, slow_drift_result
 from models.pose.site import CameraSite
 from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
@@ -46,12 +46,12 @@ def tracks_a_year(tracks: Sequence[Trajectory]) -> float:
     return max(len(tracks), 1) * _YEAR_S / max(span_s, DAY_S)
 
 
-def slow_drift_of(site: CameraSite, alarms_a_year: float) -> Creep | None:
+def slow_drift_of(site: CameraSite, alarms_a_year: float) -> SlowDrift | None:
     """Slow drift by its share of the allowed false alarms; None of a site without whole days."""
     baseline = site.baseline
     if baseline is None or baseline.days is None:
         return None
-    return creep_result(baseline.days, CREEP_SHARE * alarms_a_year, baseline.from_s)
+    return slow_drift_result(baseline.days, SLOW_DRIFT_SHARE * alarms_a_year, baseline.from_s)
 
 
 def chart_of(
@@ -59,7 +59,7 @@ def chart_of(
 ) -> ChartResult | None:
     """The chart's result of tracks since the operator's last answer, from a change on."""
     rate = AlarmRate(
-        alarms_a_year=(1 - CREEP_SHARE) * limits.alarms_a_year,
+        alarms_a_year=(1 - SLOW_DRIFT_SHARE) * limits.alarms_a_year,
         tracks_a_year=limits.tracks_a_year,
         calm_ratio=limits.drift.clear_ratio,
         calm_groups=limits.drift.people,

@@ -6,8 +6,8 @@ from models.assessment.values import Verdict
 from models.durations import DAY_S
 from models.geometry.pose import PARAMETERS
 from models.monitoring.chart import CLOCK, ChartResult
-from models.monitoring.creep import Creep
 from models.monitoring.drift import LIKELY, Drift, DriftLimits
+from models.monitoring.slow_drift import SlowDrift
 from models.reasons import Reason, TracksCode, Value
 
 
@@ -52,19 +52,19 @@ def reason_of_chart(chart: ChartResult) -> Reason | None:
     return Reason(code=TracksCode.CHART, values=values)
 
 
-def reason_of_slow_drift(creep: Creep) -> Reason | None:
-    """Direction, size and beginning of a camera's creep; None where it has not crept.
+def reason_of_slow_drift(slow_drift: SlowDrift) -> Reason | None:
+    """Direction, size and start of a camera's slow drift; None if there is none.
 
     `since` is a time, as of `datetime.isoformat`.
     """
-    if not creep.moved:
+    if not slow_drift.moved:
         return None
     values: dict[str, Value] = {
-        "number": PARAMETERS[creep.parameter],
-        "by_rad": creep.by,
-        "sd_rad": creep.sd,
-        "since": datetime.fromtimestamp(creep.since_day * DAY_S, UTC).isoformat(),
-        "statistic": creep.statistic,
-        "level": creep.level,
+        "number": PARAMETERS[slow_drift.parameter],
+        "by_rad": slow_drift.by,
+        "sd_rad": slow_drift.sd,
+        "since": datetime.fromtimestamp(slow_drift.since_day * DAY_S, UTC).isoformat(),
+        "statistic": slow_drift.statistic,
+        "level": slow_drift.level,
     }
-    return Reason(code=TracksCode.CREPT, values=values)
+    return Reason(code=TracksCode.SLOW_DRIFT, values=values)

@@ -2,7 +2,7 @@
 
 The map that estimates use grows by habits alone: the drift that is estimated so far is taken out of
 the tracks that it grows by. What remains in it by mistake does not move the baseline, so the slow
-drift is still found (`models.monitoring.creep`).
+drift is still found (`models.monitoring.slow_drift`).
 """
 
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
-from models.monitoring.creep import CreepLog, add_day, begin_log, posterior_mean_turns
 from models.monitoring.group_scores import score_groups
+from models.monitoring.slow_drift import SlowDriftLog, add_day, begin_log, posterior_mean_turns
 from models.pose import config
 from models.pose.site import CameraSite
 from models.simulation.poses import PoseOffset, offset_trajectory
@@ -22,14 +22,14 @@ from models.tracks.observations import Observations, of_tracks
 from models.tracks.trajectory import Trajectory
 
 
-def begin_creep_log(first: CameraSite, to_s: float) -> CreepLog | None:
+def begin_slow_drift_log(first: CameraSite, to_s: float) -> SlowDriftLog | None:
     """The log of a site as it was first learned, of tracks up to a time; None without a chart."""
     if first.paths is None or first.chart is None:
         return None
     return begin_log(first.chart, to_s)
 
 
-def log_creep(log: CreepLog, tracks: Observations, first: CameraSite) -> CreepLog:
+def log_slow_drift(log: SlowDriftLog, tracks: Observations, first: CameraSite) -> SlowDriftLog:
     """The log with the days of tracks that it does not have yet; these have to be whole days.
 
     `first` is the site as it was first learned, never grown.
@@ -48,16 +48,16 @@ def log_creep(log: CreepLog, tracks: Observations, first: CameraSite) -> CreepLo
     return log
 
 
-def without_creep(
+def without_slow_drift(
     tracks: Sequence[Trajectory],
     intrinsics: Intrinsics,
     prior: CameraPose,
-    log: CreepLog,
+    log: SlowDriftLog,
     from_s: float | None = None,
 ) -> list[Trajectory | None]:
     """Each track as it would be seen had the camera not crept; None where it would be out of sight.
 
-    Since `from_s` the camera has stood as it does, but for a creep.
+    Since `from_s` the camera has moved only by slow drift.
     """
     ended_s = np.array([track.time_s[-1] for track in tracks])
     turns = posterior_mean_turns(log, ended_s / DAY_S, from_s)

@@ -13,8 +13,8 @@ from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array, Index, Mask
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep
 from models.monitoring.drift import Drift, DriftLimits
+from models.monitoring.slow_drift import SlowDrift
 from models.pose import config
 from models.pose.estimating import PartialFailure, PoseFinding
 from models.pose.hypotheses import PosePosterior
@@ -183,7 +183,7 @@ class Assessment:
 
     observed: Observed
     chart: ChartResult | None
-    slow_drift: Creep | None
+    slow_drift: SlowDrift | None
     estimated: PoseFinding
     decision: Decision
     reasons: tuple[Reason, ...]

@@ -4,8 +4,8 @@ from models.assessment.values import Verdict
 from models.geometry.pose import ANGLES, PARAMETERS
 from models.monitoring import config
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep
 from models.monitoring.drift import LIKELY, Drift, DriftLimits
+from models.monitoring.slow_drift import SlowDrift
 
 # A wrong clock looks like another height.
 _CHARTED = (*PARAMETERS, "height")
@@ -16,7 +16,7 @@ def judge(
     limits: DriftLimits,
     drifted: tuple[str, ...],
     chart: ChartResult | None = None,
-    creep: Creep | None = None,
+    slow_drift: SlowDrift | None = None,
     *,
     enough: bool = True,
     scaled: bool = False,
@@ -33,7 +33,9 @@ def judge(
     Before `enough` people came since an operator's answer, the pose neither begins nor ends a
     drift. A wrong clock or lens of a stationary camera counts as a drift in height (`scaled`).
     """
-    crept = () if creep is None or not creep.moved else (PARAMETERS[creep.parameter],)
+    crept = (
+        () if slow_drift is None or not slow_drift.moved else (PARAMETERS[slow_drift.parameter],)
+    )
     if not crept and scaled and enough:
         crept = ("height",)
     beyond = _beyond(drift, limits) if enough else {}
@@ -41,7 +43,7 @@ def judge(
         return Verdict(streak=0, excess=0.0, drifted=drifted)
     charted = chart is not None and chart.moved and _confirms(drift, limits)
     alarmed = (_CHARTED[chart.parameter],) if chart is not None and charted else crept
-    calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, creep))
+    calm = all(each is None or each.excess < limits.clear_ratio for each in (chart, slow_drift))
     known = set(drift.identifiable) if chart is None else set(PARAMETERS)
     well = enough and calm and set(drifted) <= known and _is_well(drift, limits)
     streak = 1 if beyond or alarmed else -1 if well else 0
@@ -60,10 +62,10 @@ def judge(
 
 
 def may_be_alerted(
-    moved: float, limits: DriftLimits, creep: Creep | None, *, alerted: bool
+    moved: float, limits: DriftLimits, slow_drift: SlowDrift | None, *, alerted: bool
 ) -> bool:
     """False if `judge` cannot find a drift, whatever else it is given; `alerted` of one before."""
-    crept = creep is not None and creep.moved
+    crept = slow_drift is not None and slow_drift.moved
     return alerted or crept or moved >= min(config.BORNE_OUT, limits.certainty)
 
 

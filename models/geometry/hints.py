@@ -58,12 +58,13 @@ class Hint:
 class HintedPose:
     """The pose (6,) with its covariance (6, 6), as of a candidate, and how far each hint is off.
 
-    `off_sd` are standard deviations of the hint's own; much more than 2 is a mark that lies.
+    `residual_sd` are the residuals of the hints in their own standard deviations; a mark with
+    much more than 2 is wrong.
     """
 
     values: Array
     covariance: Array
-    off_sd: tuple[float, ...]
+    residual_sd: tuple[float, ...]
 
     @property
     def pose(self) -> CameraPose:
@@ -121,7 +122,7 @@ def with_hints(
         float(norm(_whitened(hint, candidate, intrinsics)[0])) if hint in used else 0.0
         for hint in hints
     ]
-    return HintedPose(values=candidate, covariance=found, off_sd=tuple(off))
+    return HintedPose(values=candidate, covariance=found, residual_sd=tuple(off))
 
 
 def _whitened(hint: Hint, candidate: Array, lens: Intrinsics) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ _HEIGHT_M, _TILT_RAD = 4.5, math.radians(25.0)
 _SD = np.array([math.radians(30.0), math.radians(2.5), 0.6])
 _MEASURED_SD = np.array([math.radians(1.0), math.radians(1.0), 0.05])
 # More is of no use: nobody should agree to it.
-AGREED_SD = np.array([math.radians(4.0), math.radians(4.0), 0.3])
+CONFIRMABLE_SD = np.array([math.radians(4.0), math.radians(4.0), 0.3])
 MEASURABLE = ("tilt_rad", "roll_rad", "height_m")  # in the order of the three
 
 

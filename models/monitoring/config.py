@@ -51,15 +51,17 @@ CLOCK_TURNED = 0.25  # at the most, how likely an angle changed, too
 USUAL_RATE_HZ = 25.0  # frames, where nobody says: for the words alone
 GROUPS_FOR_POSE = 24  # walking groups; after fewer, an alarm about a scale waits for the pose
 
-# Creep
-CREEP_SHARE = 0.1  # of the false alarms that are allowed a camera are the creep's
-CREEP_TESTS = 200.0  # independent ones a year that it is worth, by logs drawn with its own noise
+# Slow drift
+SLOW_DRIFT_SHARE = 0.1  # of a camera's allowed false alarms
+SLOW_DRIFT_TESTS = (
+    200.0  # independent ones a year that it is worth, by logs drawn with its own noise
+)
 BLOCK_DAYS, MOST_BLOCKS = 7, 104  # weekends walk otherwise; two years
-FEWEST_LOGGED = 60  # walking groups; of fewer no creep is looked for
-SEASON_DAYS = 60.0  # for which a habit of a season lasts: slower turns are creeps
+FEWEST_LOGGED = 60  # walking groups; with fewer the test is not made
+SEASON_DAYS = 60.0  # a seasonal habit lasts as long: slower turns are slow drift
 FREE_RAD = np.radians(60.0)  # sd of a turn by one group, at the most: keeps all of it invertible
-# Prior of the turn that growth takes out of tracks: how fast cameras creep, and how many do.
-CREEP_RAD, CREEP_DAYS, CREEPING_SHARE = np.radians(0.5), 30.0, 0.1
+# Prior of the turn that growth takes out of tracks: how fast cameras drift, and how many do.
+SLOW_DRIFT_RAD, SLOW_DRIFT_DAYS, SLOW_DRIFT_PRIOR = np.radians(0.5), 30.0, 0.1
 
 # Arrivals: chosen on the simulated years of `studies.alarms.arrivals_study` (seed 7)
 FEWEST_WEEKDAYS, FEWEST_WEEKEND_DAYS = 5, 4  # days of each, for the two to have their own rates

@@ -1,6 +1,6 @@
 """The references of a camera, by light: which of them a picture matches, and when one is renewed.
 
-Each carries its turn against the first, so that a camera's creep cannot hide in renewals.
+Each carries its turn against the first, so that renewals cannot hide a slow drift.
 """
 
 import math

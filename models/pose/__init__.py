@@ -3,13 +3,13 @@
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.chart import CLOCK, ChartResult, chart_from_bytes, chart_to_bytes
-from models.monitoring.creep import (
-    Creep,
-    CreepLog,
-    creep_log_from_bytes,
-    creep_log_to_bytes,
-)
 from models.monitoring.drift import Drift, DriftLimits
+from models.monitoring.slow_drift import (
+    SlowDrift,
+    SlowDriftLog,
+    slow_drift_log_from_bytes,
+    slow_drift_log_to_bytes,
+)
 from models.paths.reference import paths_from_bytes, paths_to_bytes
 from models.pose.causes import Cause
 from models.pose.config import FEWEST_BESIDE
@@ -31,8 +31,8 @@ from models.pose.picture import (
     with_picture,
 )
 from models.pose.pose_fit import (
+    Alternative,
     FusedEstimate,
-    Rival,
     WarmStart,
     warm_start_from_bytes,
     warm_start_to_bytes,
@@ -55,8 +55,8 @@ __all__ = [
     "SpeedReference",
     "chart_from_bytes",
     "chart_to_bytes",
-    "creep_log_from_bytes",
-    "creep_log_to_bytes",
+    "slow_drift_log_from_bytes",
+    "slow_drift_log_to_bytes",
     "paths_from_bytes",
     "paths_to_bytes",
     "reference_from_bytes",
@@ -64,8 +64,8 @@ __all__ = [
     "CameraPose",
     "Baseline",
     "CameraSite",
-    "Creep",
-    "CreepLog",
+    "SlowDrift",
+    "SlowDriftLog",
     "Drift",
     "DriftLimits",
     "FusedEstimate",
@@ -98,7 +98,7 @@ __all__ = [
     "pose_posterior",
     "Hypothesis",
     "PEOPLE",
-    "Rival",
+    "Alternative",
     "SelfCalibration",
     "self_calibrate",
     "smallest_told",

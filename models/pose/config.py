@@ -24,8 +24,8 @@ SHARED = 3  # parameters that speeds and places both determine, tilt, roll, heig
 # What a fused estimate needs, and says.
 FEWEST_GROUPS = 5  # walking groups: of fewer, places have no part
 BY_CHANCE = 0.01  # of still cameras seem turned in tilt or roll: else changed paths are a clock's
-RIVAL = 0.05  # odds against the best from which another pose is named
-NO_RIVAL = 1e-6  # odds below which another pose is not even begun at next time
+ALTERNATIVE = 0.05  # odds against the best from which another pose is named
+NO_ALTERNATIVE = 1e-6  # odds below which another pose is not even begun at next time
 
 # A change of the pose within a window.
 FEWEST_BESIDE = 12  # tracks before and after: fewer do not make a pose of their own
@@ -63,7 +63,7 @@ WIDER = 1.25  # times the standard deviation
 WORSE = 10.0  # of the log likelihood: other modes are some 40 below, or known
 SUSPICION, MORE_SUSPICION = 0.4, 1.25  # of the limit; times what it was where nothing was found
 
-# An anchor's creep, in radians: a track turned by less is taken as it is.
+# Slow drift of an anchor in radians: a track turned by less is used unchanged.
 NO_TURN_RAD = np.radians(0.02)
 
 # What moved. Shares and sizes are guesses by what brackets do: a screw slips in tilt, a hand turns
@@ -115,7 +115,7 @@ LEAVES_PATHS, PATHS_CHANGE = 0.5, 0.02
 # A still camera is told to stand where a turn would have been noticed: at four sd, 12 deg would.
 NOTICED_SD, NOTICED_RAD = math.radians(3.0), math.radians(5.0)
 CHART_EVIDENCE = 0.1  # of a chart's log likelihood ratio beyond its level: days differ by the rest
-LEAST_FALSE = 0.02  # of windows of a camera that stands are told to creep, at least
+LEAST_FALSE = 0.02  # at least, of a stationary camera's windows
 
 # A pose by people alone: tilt, roll (radians), log height.
 CALIBRATION_TILTS_RAD = np.radians(np.arange(0.0, 80.0, 4.0))

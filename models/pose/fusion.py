@@ -29,8 +29,8 @@ from models.pose.modes import (
     odds_of,
 )
 from models.pose.pose_fit import (
+    Alternative,
     FusedEstimate,
-    Rival,
     WarmStart,
     by_speeds_alone,
 )
@@ -162,12 +162,12 @@ def _estimate_of(
     """The estimate of a pose and its covariance, with what else explains the tracks."""
     best, sd = modes[0], np.sqrt(np.diag(covariance))
     others = list(zip(modes[1:], odds[1:], strict=True))
-    rivals = tuple(
-        Rival(values=mode.candidate, weight=float(own / odds.sum()))
+    alternatives = tuple(
+        Alternative(values=mode.candidate, weight=float(own / odds.sum()))
         for mode, own in others
-        if own > config.RIVAL
+        if own > config.ALTERNATIVE
     )
-    near = [mode.candidate for mode, own in others if own > config.NO_RIVAL]
+    near = [mode.candidate for mode, own in others if own > config.NO_ALTERNATIVE]
     # What speeds leave open, places alone do not determine: crowds that all cross the picture fit
     # a map at a tilt that is ten degrees off, and it seems sharp there.
     determined = ("heading", *joint.identifiable)
@@ -175,9 +175,9 @@ def _estimate_of(
         values=values,
         covariance=covariance,
         identifiable=tuple(name for name in identifiable_of(PARAMETERS, sd) if name in determined),
-        reason=_reason(float(values[3]), rivals, float(sd[3]), prior),
+        reason=_reason(float(values[3]), alternatives, float(sd[3]), prior),
         raw=best.candidate,
-        rivals=rivals,
+        alternatives=alternatives,
         modes=(best.candidate, *near),
         path_fit=float(fits.sum()),
         prior_loss=loss(
@@ -188,13 +188,13 @@ def _estimate_of(
 
 
 def _reason(
-    heading: float, rivals: tuple[Rival, ...], sd: float, prior: CameraPose
+    heading: float, alternatives: tuple[Alternative, ...], sd: float, prior: CameraPose
 ) -> Reason | None:
     """The reason of a heading that is ambiguous or unsure; None of others."""
-    if rivals:
+    if alternatives:
         turns = sorted(
             turn - prior.heading_rad
-            for turn in (heading, *(float(rival.values[3]) for rival in rivals))
+            for turn in (heading, *(float(alternative.values[3]) for alternative in alternatives))
         )
         return Reason(code=TracksCode.HEADING_AMBIGUOUS, values={"turns_rad": turns})
     return _unidentifiable(sd) if sd > IDENTIFIABLE_SD[3] else None

@@ -29,7 +29,7 @@ from models.walking.fit import FitStart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rival:
+class Alternative:
     """Another pose (4,) that explains the tracks: its weight, among all that do."""
 
     values: Array
@@ -43,7 +43,7 @@ class FusedEstimate:
     `identifiable` names those of tilt, roll, height, heading that the tracks determine; `reason`
     says what is wrong with the paths, if anything. `raw` (4,) is before their bias is taken off;
     None where they had no part: then all is the joint estimate's and the heading the prior pose's.
-    `rivals` are other poses that explain the tracks about as well. `modes`
+    `alternatives` are other poses that explain the tracks about as well. `modes`
     (4,) are where the search ended, the best first: `raw`, and what may have to do with the
     covariance. `path_fit` is the sum over walking groups of how well they fit the paths at `raw`,
     in logs, and `prior_loss` how much worse they do at the prior pose, in standard errors;
@@ -56,7 +56,7 @@ class FusedEstimate:
     identifiable: tuple[str, ...]
     reason: Reason | None
     raw: Array | None = None
-    rivals: tuple[Rival, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
     modes: tuple[Array, ...] = ()
     path_fit: float = 0.0
     prior_loss: float = 0.0

@@ -20,7 +20,7 @@ from models.errors import TooFewTrajectoriesError
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
-from models.geometry.usual_pose import AGREED_SD, measured_precision, usual_pose, usual_sd
+from models.geometry.usual_pose import CONFIRMABLE_SD, measured_precision, usual_pose, usual_sd
 from models.pose import config
 from models.simulation.walkers import WalkConfig
 from models.tracks.observations import Observations
@@ -199,7 +199,7 @@ def _mixed(ends: Sequence[_End]) -> SelfCalibration:
         apart = end.normal.mean - middle
         covariance += one * (end.normal.covariance + np.outer(apart, apart))
     sd = np.sqrt(np.diag(covariance))
-    found = (sd <= AGREED_SD) & best.enough
+    found = (sd <= CONFIRMABLE_SD) & best.enough
     named = zip(PLANE_PARAMETERS, found, strict=True)
     return SelfCalibration(
         values=middle,

@@ -9,8 +9,8 @@ from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array
 from models.monitoring.chart import DriftChart
 from models.monitoring.chart_learning import learn_chart
-from models.monitoring.creep import CreepLog
 from models.monitoring.group_scores import Usual
+from models.monitoring.slow_drift import SlowDriftLog
 from models.paths.folds import ChosenBandwidths, fold_maps
 from models.paths.reference import PathReference, learn_paths
 from models.simulation.walkers import WalkConfig
@@ -29,7 +29,7 @@ class Baseline:
 
     paths: PathReference
     chart: DriftChart
-    days: CreepLog | None = None
+    days: SlowDriftLog | None = None
     from_s: float | None = None
 
 

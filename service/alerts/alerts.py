@@ -164,8 +164,8 @@ def close_pose_alerts(
     for kind in alerts.POSE_KINDS:
         record = alerts.firing(session, camera_id, kind)
         if record is not None:
-            mended = outcome in (Outcome.PUT_BACK, Outcome.ACCEPTED) and kind in alerts.SCALE_KINDS
-            close_alert(session, record, Outcome.MENDED if mended else outcome, note, by)
+            fixed = outcome in (Outcome.PUT_BACK, Outcome.ACCEPTED) and kind in alerts.SCALE_KINDS
+            close_alert(session, record, Outcome.FIXED if fixed else outcome, note, by)
 
 
 def close_alert(

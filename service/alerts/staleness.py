@@ -1,4 +1,4 @@
-"""The alert `stale` of cameras whose estimate is not being made, or lacks some of its tracks."""
+"""The alert `stale` of cameras whose estimate is not being made, or skips some of its tracks."""
 
 import time
 from datetime import UTC, datetime, timedelta
@@ -80,7 +80,7 @@ def _why_stale(camera: CameraRecord, settings: Settings, waits_s: float) -> Reas
     if waits_s > settings.stale_after_s:
         waited = {"waits_s": waits_s, "limit_s": settings.stale_after_s}
         return Reason(code=ServiceCode.TRACKS_WAIT, values=waited)
-    skipped = (lack for lack in camera.lacks if lack.code == ServiceCode.TRACKS_SKIPPED)
+    skipped = (lack for lack in camera.missing_parts if lack.code == ServiceCode.TRACKS_SKIPPED)
     return next(skipped, None)
 
 

@@ -75,7 +75,7 @@ _MOST_ID = 2**63 - 1
     response_model=ActivityPage,
     responses={200: {"content": {_LINES: {"schema": {"type": "string"}}, CSV: {}}}},
 )
-def show(
+def list_activity(
     state: StateDep,
     wanted: Annotated[_Wanted, Depends(_wanted)],
     after: Annotated[int, Query(ge=0, le=_MOST_ID)] = 0,
@@ -84,9 +84,10 @@ def show(
     ] = None,
     accept: Annotated[str, Header()] = "",
 ) -> ActivityPage | Response:
-    """What was done, oldest first, also at cameras that are gone; 100 a page if unsaid.
+    """List the activity log, oldest first.
 
-    As `application/x-ndjson`, or as CSV, an entry a line: all there are, or the first `limit`.
+    Deleted cameras are included. A page has 100 entries by default. As `application/x-ndjson` or
+    CSV, the answer has one entry a line: all of them, or the first `limit`.
     """
     if format_ == FileFormat.CSV:
         lines = _as_csv(_batches(state, wanted, after))

@@ -57,11 +57,13 @@ _FETCH_S = 4.0
 
 
 @router.post("", openapi_extra=_DESCRIBED_BODY)
-def show(camera_id: str, request: Request, body: BodyDep, state: StateDep) -> AimOut:
-    """Where to turn the camera, by the image that is sent or fetched from its `snapshot_url`.
+def get_aiming_directions(
+    camera_id: str, request: Request, body: BodyDep, state: StateDep
+) -> AimOut:
+    """Get the directions for turning a camera back.
 
-    The image is not kept. Without an image, the newest tracks are used. A camera has one such
-    request at a time.
+    The input is the image that is sent or fetched from `snapshot_url`; without an image, the newest
+    tracks. The image is not stored. A camera takes one such request at a time.
     """
     settings = state.settings
     with state.store.read() as session:

@@ -14,12 +14,12 @@ from service.api.ignored import NamingRoute
 from service.api.middleware.dependencies import ReadDep, StateDep, WriteDep
 from service.api.schemas import (
     POSE_FIELDS,
+    AlternativeOut,
     Body,
     Moment,
     Out,
     ReasonCode,
     ReasonValues,
-    RivalOut,
     SinceOut,
     Text,
     Who,
@@ -106,14 +106,14 @@ class AlertOut(BaseModel):
 
 
 # Of an activity, `alert.silenced` say, the act alone.
-Act = Annotated[AlertActivity, BeforeValidator(lambda what: what.partition(".")[2])]
+Action = Annotated[AlertActivity, BeforeValidator(lambda what: what.partition(".")[2])]
 
 
-class ActOut(Out):
+class ActionOut(Out):
     """What somebody did with an alert; without a name, the service by itself."""
 
     at: datetime
-    act: Act = Field(validation_alias="what")
+    action: Action = Field(validation_alias="what")
     by: str | None
     until: datetime | None
     outcome: Outcome | None
@@ -137,7 +137,7 @@ class MovedZoneOut(BaseModel):
     false_counts: int | None
 
 
-class MendedZonesOut(BaseModel):
+class CorrectedZonesOut(BaseModel):
     """Where zones are as they should lie now, in the form that they came in, and what to do."""
 
     path: str
@@ -149,8 +149,8 @@ class AlertDetail(AlertOut):
     """An alert, what its move is to zones, and what was done with it, oldest first."""
 
     zones: list[MovedZoneOut] | None
-    mended_zones: MendedZonesOut | None
-    acts: list[ActOut] = []
+    corrected_zones: CorrectedZonesOut | None
+    acts: list[ActionOut] = []
 
 
 class AlertList(BaseModel):
@@ -217,7 +217,7 @@ class EvidenceOut(BaseModel):
     offset_sd: OffsetSdOut
     registered: bool
     prior_loss_sd: float
-    rivals: list[RivalOut]
+    alternatives: list[AlternativeOut]
     chart: ChartOut | None
     creep: StatisticOut | None
 
@@ -286,7 +286,7 @@ router = APIRouter(prefix="/alerts", tags=["alerts"], route_class=NamingRoute)
 
 
 @router.get("", response_model=AlertList, responses={200: {"content": {CSV: {}}}})
-def list_all(
+def list_alerts(
     request: Request,
     session: ReadDep,
     chosen: ChosenDep,
@@ -295,7 +295,10 @@ def list_all(
     ] = None,
     limit: Annotated[int | None, Query(ge=1, le=10_000, description="1,000 of JSON")] = None,
 ) -> AlertList | Response:
-    """Alerts, newest first: 100 a page if unsaid, of CSV 10,000. A browser is led to the page."""
+    """List the alerts, newest first.
+
+    A page has 100 by default, a CSV file 10,000. A browser is redirected to the page of alerts.
+    """
     if format_ == FileFormat.CSV:
         found = map(alert_body, alerts.list_alerts(session, chosen, limit or _MOST_LINES))
         lines = csv_lines([_COLUMNS, *([body[name] for name in _COLUMNS] for body in found)])
@@ -315,49 +318,63 @@ def list_all(
 
 
 @router.get("/{alert_id}")
-def show(alert_id: str, session: ReadDep) -> AlertDetail:
-    """An alert, and what was done with it."""
-    return _with_acts(session, alerts.show_alert(session, alert_id))
+def get_alert(alert_id: str, session: ReadDep) -> AlertDetail:
+    """Get an alert with the actions on it."""
+    return _with_actions(session, alerts.show_alert(session, alert_id))
 
 
 @router.get("/{alert_id}/evidence")
-def evidence(alert_id: str, session: ReadDep) -> EvidenceOut:
-    """What the newest estimate behind an alert was by."""
+def get_alert_evidence(alert_id: str, session: ReadDep) -> EvidenceOut:
+    """Get the evidence of an alert.
+
+    It comes from the newest estimate that supports the alert.
+    """
     return EvidenceOut.from_value(alerts.evidence_of_alert(session, alert_id))
 
 
 @router.post("/{alert_id}/acknowledge")
-def acknowledge(
+def acknowledge_alert(
     alert_id: str, session: WriteDep, body: AcknowledgeBody | None = None
 ) -> AlertDetail:
-    """Note who looks after an alert, or that they do no more."""
+    """Acknowledge an alert.
+
+    `acknowledged` false takes the acknowledgement back.
+    """
     said = body or AcknowledgeBody()
     by = name_in(session, said.by)
     record = alerts.acknowledge_alert(session, alert_id, by, acknowledged=said.acknowledged)
-    return _with_acts(session, record)
+    return _with_actions(session, record)
 
 
 @router.post("/{alert_id}/silence")
-def silence_one(
+def silence_alert(
     alert_id: str, body: SilenceBody, state: StateDep, session: WriteDep
 ) -> AlertDetail:
-    """Silence an alert until a time, in place of the silence it may have; null ends that."""
+    """Silence an alert until a time.
+
+    The new end replaces an earlier one; null ends the silence.
+    """
     record = silence.silence_alert(
         session, state.settings, alert_id, body.until, body.reason, name_in(session, body.by)
     )
-    return _with_acts(session, record)
+    return _with_actions(session, record)
 
 
 @router.post("/{alert_id}/resolve")
-def resolve(alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep) -> AlertDetail:
-    """End an alert with what came of it; `accepted` accepts the served pose, as `pose/accept`."""
+def resolve_alert(
+    alert_id: str, body: ResolveBody, state: StateDep, session: WriteDep
+) -> AlertDetail:
+    """Resolve an alert with an outcome.
+
+    `accepted` accepts the served pose, as `pose/accept` does.
+    """
     by = name_in(session, body.by)
     record = decisions.resolve_alert(
         session, state.queue, state.settings, alert_id, body.outcome, body.note, by
     )
-    return _with_acts(session, record)
+    return _with_actions(session, record)
 
 
-def _with_acts(session: Session, record: AlertRecord) -> AlertDetail:
+def _with_actions(session: Session, record: AlertRecord) -> AlertDetail:
     acts = alerts.activity_of_alert(session, record.id)
     return AlertDetail.model_validate({**alert_body(record), "acts": acts})

@@ -52,8 +52,13 @@ router = APIRouter(prefix="/bridges", tags=["operation"])
 
 
 @router.put("/{bridge}", status_code=204)
-def report(bridge: BridgeName, body: BridgeBody, write: WritesDep, caller: CallerDep) -> None:
-    """Record that a bridge works, and its counts; it does so every 10 s."""
+def report_bridge(
+    bridge: BridgeName, body: BridgeBody, write: WritesDep, caller: CallerDep
+) -> None:
+    """Report the state and the counts of a bridge.
+
+    A bridge does so every 10 s.
+    """
     found = body.model_dump(mode="json", exclude={"started_at", "stopped"})
     if caller is not None:
         found["cameras"] = [each for each in body.cameras if caller.may_post(each)]

@@ -42,16 +42,17 @@ _BODY: dict[str, Any] = {"requestBody": {"required": True, "content": {"applicat
 
 
 @router.post("", openapi_extra=_BODY)
-def read(
+def read_calibration(
     body: BodyDep,
     camera: Annotated[Text, Query(description="its name in a file of several")] = "",
     width: Annotated[PictureSide | None, Query(description="if the file has no size")] = None,
     height: Annotated[PictureSide | None, Query(description="if the file has no size")] = None,
 ) -> CalibrationOut:
-    """Read a calibration file of OpenCV, ROS, Kalibr, MATLAB, COLMAP, NVIDIA, KRTD or Tsai.
+    """Read a calibration file.
 
-    `intrinsics` and `prior_pose` of the answer fit `POST /cameras`; nothing is stored. `notes` has
-    what the file holds and was not taken, such as the rotation between two cameras.
+    The formats are OpenCV, ROS, Kalibr, MATLAB, COLMAP, NVIDIA, KRTD and Tsai. `intrinsics` and
+    `prior_pose` of the answer fit `POST /cameras`; nothing is stored. `notes` lists contents of the
+    file that are not used, such as the rotation between two cameras.
     """
     size = None if width is None or height is None else (width, height)
     return CalibrationOut.from_value(read_camera(body, camera or None, size))

@@ -303,12 +303,13 @@ router = APIRouter(prefix="/cameras", tags=["cameras"], route_class=NamingRoute)
 
 
 @router.post("", status_code=201, responses={201: {"headers": ETAG}})
-def register(
+def register_camera(
     body: CameraBody, state: StateDep, session: WriteDep, caller: CallerDep, response: Response
 ) -> CameraAnswer:
-    """Register a camera with its intrinsics and prior pose; queues its first training.
+    """Register a camera.
 
-    `questions` names what may be a slip of the pen, such as millimetres for pixels.
+    Its first training is queued. `questions` lists values that may be mistakes, such as millimetres
+    in place of pixels.
     """
     view = cameras.register_camera(session, state.queue, state.settings, body.to_spec())
     response.headers["Location"] = f"/cameras/{view.record.id}"
@@ -317,7 +318,7 @@ def register(
 
 
 @router.get("")
-def list_all(
+def list_cameras(
     state: StateDep,
     session: ReadDep,
     caller: CallerDep,
@@ -330,7 +331,10 @@ def list_all(
     site: Annotated[Site, Query(description="cameras of this site and of those below it")] = "",
     tag: Annotated[Tags | None, Query(description="cameras with all of these")] = None,
 ) -> CameraPage:
-    """Cameras in order of their ids; `next_cursor` leads to the next page."""
+    """List the cameras.
+
+    They are ordered by id; `next_cursor` leads to the next page.
+    """
     views = cameras.list_cameras(
         session, state.settings, cursor, limit + 1, wanted or (), site, tag or ()
     )
@@ -342,17 +346,20 @@ def list_all(
 
 
 @router.get("/{camera_id}", responses={200: {"headers": ETAG}})
-def show(
+def get_camera(
     camera_id: str, state: StateDep, session: ReadDep, caller: CallerDep, response: Response
 ) -> CameraOut:
-    """A camera, with the ETag that a change asks for."""
+    """Get a camera.
+
+    The `ETag` of the answer is needed to change the camera.
+    """
     view = cameras.view_camera(session, state.settings, camera_id)
     response.headers["ETag"] = view.etag
     return CameraOut.from_value(view, caller)
 
 
 @router.patch("/{camera_id}", responses={200: {"headers": ETAG}})
-def change(
+def change_camera(
     camera_id: str,
     body: CameraPatch,
     state: StateDep,
@@ -361,13 +368,14 @@ def change(
     response: Response,
     if_match: IfMatch = None,
 ) -> CameraAnswer:
-    """Change a camera; another lens, prior pose or walking speed queues a training.
+    """Change a camera.
 
-    So does `tracks_size` or `tracks_normalised` if it rescales stored tracks. It answers the
-    question about them in `GET /cameras/{id}/pose`.
+    Another lens, prior pose or walking speed queues a training. So does `tracks_size` or
+    `tracks_normalised` if it rescales stored tracks; either answers the question about them in
+    `GET /cameras/{id}/pose`.
 
-    `If-Match` is the ETag of the camera as it was read; without it the answer, 428, has it in
-    `etag`, and so has that of a change made of an older version, 412.
+    `If-Match` is the `ETag` of the camera as it was read. Without it the answer is 428, and with an
+    older one 412; both have the current one in `etag`.
     """
     given = body.snapshot_credentials
     prior = body.prior_pose
@@ -402,13 +410,16 @@ def change(
 
 
 @router.delete("/{camera_id}", status_code=204)
-def remove(
+def delete_camera(
     camera_id: str,
     state: StateDep,
     session: WriteDep,
     if_match: IfMatch = None,
     by: Annotated[Who | None, Query(description="who deletes it")] = None,
 ) -> None:
-    """Delete a camera with its tracks, models, estimates and alerts; `If-Match` as of a change."""
+    """Delete a camera with its tracks, models, estimates and alerts.
+
+    `If-Match` is needed as for a change.
+    """
     cameras.remove_camera(session, camera_id, if_match, by)
     state.posts.forget(camera_id)  # another may come under its id

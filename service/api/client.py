@@ -14,8 +14,11 @@ class _PythonFile(FileResponse):
 
 
 @router.get("/client.py", response_class=_PythonFile)
-def client() -> FileResponse:
-    """A module that stands alone on Python's standard library and posts tracks."""
+def get_client() -> FileResponse:
+    """Get the client module.
+
+    It posts tracks and needs only the Python standard library.
+    """
     spec = find_spec("surefoot")  # which imports nothing of it: numpy is not for this process
     assert spec is not None
     assert spec.submodule_search_locations

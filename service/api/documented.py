@@ -1,18 +1,23 @@
-"""Errors and examples in `/openapi.json`, for all routes in one place.
+"""Names, errors and examples of all routes in `/openapi.json`.
 
-FastAPI describes its own 422, which is not what is answered here, and no other error. Which errors
-a route may answer follows from what it takes: a name in the path, a body, a header, a change.
+A route's operation id is the name of its function. Its summary is the first line of the docstring,
+and its description the rest.
 
-Examples are in `examples.json`, by the schema that they are of: real ones, which
-`python -m tests.reference --write` makes and a test makes again.
+FastAPI describes its own 422, which this service does not return, and no other error. The possible
+errors of a route follow from its inputs: a name in the path, a body, a header, a change.
+
+`examples.json` has a real example of each schema. `python -m tests.reference --write` writes it,
+and a test compares it with new ones.
 """
 
 import json
 from collections.abc import Iterator
+from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 from pydantic.json_schema import models_json_schema
 
@@ -64,9 +69,14 @@ class Problem(BaseModel):
     etag: str | None = Field(None, description="with 412 and 428: what If-Match has to be now")
 
 
-def document_errors(app: FastAPI) -> None:
-    """Have an application describe its errors; after all its routes are included."""
+def document_routes(app: FastAPI) -> None:
+    """Complete the OpenAPI document of an application that has all its routes."""
     described = app.openapi
+    for route in app.routes:
+        if isinstance(route, APIRoute) and route.include_in_schema:
+            summary, _, rest = (getdoc(route.endpoint) or "").partition("\n")
+            route.operation_id = route.name
+            route.summary, route.description = summary.strip().removesuffix("."), rest.strip()
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:

@@ -20,16 +20,17 @@ _ID = re.compile(r"[0-9]{1,30}")
 
 
 @router.get("/events", response_class=EventSourceResponse)
-async def events(
+async def stream_events(
     request: Request,
     state: StateDep,
     last_event_id: Annotated[str | None, Header()] = None,
     after: Annotated[int | None, Query(ge=0, le=_MAX_ID)] = None,
 ) -> AsyncIterator[ServerSentEvent]:
-    """Poses, alerts and trainings as they happen; with `Last-Event-ID`, all since that one.
+    """Stream poses, alerts and trainings as server-sent events.
 
-    `after` says the same for who cannot send a header with the first request: browsers. A pose's
-    event without a state says that its camera was registered, changed or removed.
+    With `Last-Event-ID`, the stream begins after that event; `after` does the same for browsers,
+    which cannot send the header with the first request. A `pose` event without a state means that
+    the camera was registered, changed or deleted.
     """
     given = (last_event_id or "").strip()
     asked = int(given) if _ID.fullmatch(given) else after

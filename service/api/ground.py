@@ -69,9 +69,9 @@ class PixelOut(BaseModel):
 class HeldPoseOut(BaseModel):
     """A pose that held `since` a time.
 
-    Ellipses are of the numbers in `estimated`; the others are the prior pose's. Where the camera
-    has `drifted` and none is estimated, nobody knows where it stands. `pose` is null where nobody
-    has agreed to one.
+    Ellipses are of the numbers in `estimated`; the others are the prior pose's. If the camera
+    has `drifted` and none is estimated, its position is unknown. `pose` is null if no pose has
+    been confirmed.
     """
 
     drifted: bool
@@ -113,16 +113,22 @@ _Ellipse = msgspec.defstruct("_Ellipse", ["major", "minor", "angle"], array_like
 
 
 @router.post("/ground", response_model=PlacesOut)
-def ground(camera_id: str, body: PixelsBody, session: ReadDep) -> Response:
-    """Where pixels are on the ground, by the pose that held, and how far off that may be."""
+def map_pixels_to_ground(camera_id: str, body: PixelsBody, session: ReadDep) -> Response:
+    """Map pixels to the ground.
+
+    The pose that held at the given time is used. Each place has its error ellipse.
+    """
     lens = require_camera(session, camera_id).intrinsics
     held = held_pose(session, camera_id, body.at)
     return _answer(_Place, held, *places_of_pixels(lens, held, _array(body.points)))
 
 
 @router.post("/image", response_model=PixelsOut)
-def image(camera_id: str, body: PlacesBody, session: ReadDep) -> Response:
-    """Where places on the ground are in the picture, by the pose that held."""
+def map_ground_to_pixels(camera_id: str, body: PlacesBody, session: ReadDep) -> Response:
+    """Map places on the ground to pixels.
+
+    The pose that held at the given time is used.
+    """
     lens = require_camera(session, camera_id).intrinsics
     held = held_pose(session, camera_id, body.at)
     return _answer(_Seen, held, *pixels_of_places(lens, held, _array(body.points)))

@@ -49,22 +49,25 @@ router = APIRouter(prefix="/handovers", tags=["operation"], route_class=NamingRo
 
 
 @router.get("")
-def list_last(
+def list_handovers(
     session: ReadDep, limit: Annotated[int, Query(ge=1, le=100)] = handover.LAST
 ) -> HandoverList:
-    """The handovers that were given last."""
+    """List the newest handovers."""
     return HandoverList.model_validate({"items": handover.last_handovers(session, limit)})
 
 
 @router.post("", status_code=201)
-def give(body: HandoverBody, session: WriteDep) -> HandoverOut:
-    """Hand over what was since a time; it is shown until somebody takes it over."""
+def give_handover(body: HandoverBody, session: WriteDep) -> HandoverOut:
+    """Give a handover of the events since a time.
+
+    It is shown until it is taken over.
+    """
     by = name_in(session, body.by)
     return HandoverOut.model_validate(handover.hand_over(session, body.since, body.note, by))
 
 
 @router.post("/{handover_id}/take")
-def take(handover_id: str, session: WriteDep, body: TakeBody | None = None) -> HandoverOut:
+def take_handover(handover_id: str, session: WriteDep, body: TakeBody | None = None) -> HandoverOut:
     """Take a handover over."""
     by = name_in(session, None if body is None else body.by)
     return HandoverOut.model_validate(handover.take_over(session, handover_id, by))

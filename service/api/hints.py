@@ -71,7 +71,7 @@ class HintOut(BaseModel):
     x_m: float | None
     y_m: float | None
     sd_m: float | None
-    off_sd: float | None
+    residual_sd: float | None
 
 
 class HintsOut(BaseModel):
@@ -84,7 +84,7 @@ class HintsOut(BaseModel):
     def from_value(cls, view: HintsView) -> Self:
         """The body of marks."""
         proposal = view.proposed
-        off = None if proposal is None else proposal.off_sd
+        off = None if proposal is None else proposal.residual_sd
         items = []
         for number, kept in enumerate(view.kept):
             x_m, y_m = kept.get("place_m", (None, None))
@@ -92,7 +92,7 @@ class HintsOut(BaseModel):
                 HintOut(
                     kind=kept["kind"], points=kept["points"], length_m=kept.get("length_m"),
                     x_m=x_m, y_m=y_m, sd_m=kept.get("place_sd_m"),
-                    off_sd=None if off is None else off[number],
+                    residual_sd=None if off is None else off[number],
                 )
             )  # fmt: skip
         return cls(
@@ -104,17 +104,23 @@ router = APIRouter(prefix="/cameras/{camera_id}/hints", tags=["pose"], route_cla
 
 
 @router.get("")
-def show(camera_id: str, session: ReadDep) -> HintsOut:
-    """The marks, how far each is off, and the pose that is proposed by them."""
+def get_hints(camera_id: str, session: ReadDep) -> HintsOut:
+    """Get the hints of a camera.
+
+    Each has its residual, and the answer has the pose that is proposed.
+    """
     return HintsOut.from_value(hints.view_hints(session, camera_id))
 
 
 @router.put("")
-def put(
+def put_hints(
     camera_id: str,
     body: Annotated[list[HintBody], Body(max_length=_MOST)],
     session: WriteDep,
 ) -> HintsOut:
-    """Keep marks in place of those there were; none takes all of them back."""
+    """Replace the hints of a camera.
+
+    An empty list removes them.
+    """
     kept = [each.kept() for each in body]
     return HintsOut.from_value(hints.keep_hints(session, camera_id, kept))

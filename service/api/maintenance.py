@@ -71,14 +71,17 @@ router = APIRouter(
 
 
 @router.post("", status_code=201)
-def begin(
+def schedule_maintenance(
     camera_id: str,
     body: WindowBody,
     state: StateDep,
     session: WriteDep,
     response: Response,
 ) -> WindowOut:
-    """Say that somebody is at a camera: it is not judged, and opens no alert."""
+    """Schedule maintenance of a camera.
+
+    During a maintenance period the camera is not monitored, and no alert is opened.
+    """
     record = maintenance.open_window(
         session,
         state.queue,
@@ -94,17 +97,20 @@ def begin(
 
 
 @router.get("")
-def list_all(camera_id: str, session: ReadDep) -> WindowList:
-    """A camera's windows: planned, under way and over."""
+def list_maintenance(camera_id: str, session: ReadDep) -> WindowList:
+    """List the maintenance periods of a camera.
+
+    They are planned, under way or over.
+    """
     records = maintenance.list_windows(session, camera_id)
     return WindowList(items=[WindowOut.from_record(record) for record in records])
 
 
 @router.patch("/{window_id}")
-def change(
+def change_maintenance(
     camera_id: str, window_id: str, body: WindowPatch, state: StateDep, session: WriteDep
 ) -> WindowOut:
-    """Move a window's ends."""
+    """Change the start or the end of a maintenance period."""
     record = maintenance.change_window(
         session,
         state.queue,
@@ -119,12 +125,15 @@ def change(
 
 
 @router.delete("/{window_id}", status_code=204)
-def end(
+def end_maintenance(
     camera_id: str,
     window_id: str,
     state: StateDep,
     session: WriteDep,
     by: Annotated[Who | None, Query(description="who ends it")] = None,
 ) -> None:
-    """End a window now, or take back one that has not begun."""
+    """End a maintenance period.
+
+    A planned one is withdrawn.
+    """
     maintenance.end_window(session, state.queue, camera_id, window_id, by)

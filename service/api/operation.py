@@ -265,14 +265,20 @@ _FORMATS = dict.fromkeys(
 
 
 @router.get("/healthz")
-async def health() -> HealthOut:
-    """Whether the process answers; no thread and no connection is needed for it."""
+async def get_health() -> HealthOut:
+    """Check that the process answers.
+
+    The check needs no thread and no connection to the database.
+    """
     return HealthOut(status=Health.OK)
 
 
 @router.get("/readyz", responses={503: {"model": ReadyOut}})
-def ready(state: StateDep, caller: CallerDep, response: Response) -> ReadyOut:
-    """Whether the store can be written, a worker is alive and the queue keeps up."""
+def get_readiness(state: StateDep, caller: CallerDep, response: Response) -> ReadyOut:
+    """Check that the service is ready.
+
+    The store has to be writable, a worker alive, and the queue short enough.
+    """
     readiness = checks.check_readiness(state.store, state.settings)
     if not readiness.ready:
         response.status_code = 503
@@ -284,8 +290,13 @@ def ready(state: StateDep, caller: CallerDep, response: Response) -> ReadyOut:
 
 
 @router.get("/metrics", response_class=Response, responses={200: {"content": _FORMATS}})
-def metrics(state: StateDep, session: ReadDep, accept: Annotated[str, Header()] = "") -> Response:
-    """The metrics now, as Prometheus text or OpenMetrics."""
+def get_metrics(
+    state: StateDep, session: ReadDep, accept: Annotated[str, Header()] = ""
+) -> Response:
+    """Get the metrics.
+
+    They are in the Prometheus text format or OpenMetrics.
+    """
     encode, media_type = choose_encoder(accept)
     found = load_metrics(session, state.settings)
     text = encode(MetricsCollector(found, state.instruments.registry))

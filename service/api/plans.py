@@ -33,7 +33,7 @@ router = APIRouter(prefix="/cameras/{camera_id}/plan", tags=["cameras"])
 
 
 @router.put("", openapi_extra=IMAGE_BODY)
-def put(
+def put_plan(
     camera_id: str,
     still: Annotated[Still, Depends(read_body)],
     state: StateDep,
@@ -46,9 +46,10 @@ def put(
         Query(ge=-360, le=360, allow_inf_nan=False, description="of north, clockwise from up"),
     ] = 0.0,
 ) -> PlanOut:
-    """Keep a picture of the ground from above in place of the one there was, at most 1920 px wide.
+    """Store a ground plan of a camera.
 
-    It is made anew without EXIF. Map points are shown on it; it goes with its camera.
+    The image, seen from above, replaces the former plan. It is stored without EXIF, at most 1920 px
+    wide. Map points are shown on it.
     """
     with write(camera_id) as session:
         record = plans.put_plan(
@@ -58,17 +59,20 @@ def put(
 
 
 @router.get("", response_class=Response, responses=IMAGE_ANSWER)
-def show(
+def get_plan(
     camera_id: str,
     state: StateDep,
     session: ReadDep,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
-    """The plan of a camera."""
+    """Get the ground plan of a camera."""
     return jpeg_answer(plans.show_plan(session, state.settings, camera_id), if_none_match)
 
 
 @router.delete("", status_code=204)
-def remove(camera_id: str, session: WriteDep) -> None:
-    """Delete the plan of a camera; marks by it stay."""
+def delete_plan(camera_id: str, session: WriteDep) -> None:
+    """Delete the ground plan of a camera.
+
+    Map points that were marked on it are kept.
+    """
     plans.remove_plan(session, camera_id)

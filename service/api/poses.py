@@ -21,6 +21,7 @@ from service.api.middleware.dependencies import (
 from service.api.middleware.pages import REVALIDATED
 from service.api.schemas import (
     POSE_FIELDS,
+    AlternativeOut,
     Body,
     Moment,
     Out,
@@ -29,7 +30,6 @@ from service.api.schemas import (
     ReasonCode,
     ReasonValues,
     ReferenceOut,
-    RivalOut,
     SinceOut,
     Who,
 )
@@ -61,7 +61,7 @@ class AcceptBody(_DecisionBody):
     """Who accepts the served pose as the new prior pose, and why."""
 
 
-class AgreeBody(_DecisionBody):
+class ConfirmBody(_DecisionBody):
     """Who agrees to the pose that people told of a camera without a prior pose."""
 
 
@@ -115,7 +115,7 @@ class ProposedOut(BaseModel):
     pose: PoseOut
     sd: SdOut
     tracks: int
-    can_be_agreed: bool
+    can_be_confirmed: bool
     updated_at: datetime
 
     @classmethod
@@ -126,7 +126,7 @@ class ProposedOut(BaseModel):
             pose=PoseOut.from_value(proposal.pose),
             sd=SdOut(**sd),
             tracks=proposal.tracks,
-            can_be_agreed=proposal.told,
+            can_be_confirmed=proposal.told,
             updated_at=proposal.updated_at,
         )
 
@@ -145,8 +145,8 @@ class ServedPoseOut(BaseModel):
     drift: DriftOut | None
     moved: float | None
     moved_parameters: dict[str, float | None]
-    rivals: list[RivalOut]
-    would_notice: dict[str, dict[int, float] | None]
+    alternatives: list[AlternativeOut]
+    detectable: dict[str, dict[int, float] | None]
     since: SinceOut
     estimates: dict[str, Any]
     reference: ReferenceOut
@@ -179,8 +179,10 @@ class ServedPoseOut(BaseModel):
             drift=None if estimate is None else DriftOut.from_value(estimate.drift),
             moved=None if estimate is None else estimate.moved,
             moved_parameters=_moved_parameters(estimate),
-            rivals=[] if estimate is None else in_degrees({"rivals": estimate.rivals})["rivals"],
-            would_notice=_would_notice(estimate),
+            alternatives=[]
+            if estimate is None
+            else in_degrees({"alternatives": estimate.alternatives})["alternatives"],
+            detectable=_detectable(estimate),
             since=SinceOut(
                 after=None if estimate is None else estimate.drift_after,
                 before=None if estimate is None else estimate.drift_since,
@@ -254,9 +256,9 @@ def _moved_parameters(estimate: EstimateRecord | None) -> dict[str, float | None
     return {field: shares.get(name) for name, field in POSE_FIELDS.items()}
 
 
-def _would_notice(estimate: EstimateRecord | None) -> dict[str, dict[int, float] | None]:
+def _detectable(estimate: EstimateRecord | None) -> dict[str, dict[int, float] | None]:
     """The smallest move of each number that so many people would tell; None where none is."""
-    known = {} if estimate is None else in_degrees(estimate.would_notice)
+    known = {} if estimate is None else in_degrees(estimate.detectable)
     return {
         field: None
         if known.get(field) is None
@@ -287,7 +289,7 @@ _FILES: dict[str, Any] = {kind: {} for kind in sorted(set(MEDIA_TYPES.values()))
 
 
 @router.get("/pose", response_model=ServedPoseOut, responses={200: {"content": _FILES}})
-def show(
+def get_pose(
     camera_id: str,
     state: StateDep,
     session: ReadDep,
@@ -297,9 +299,10 @@ def show(
     origin_lon_deg: _Longitude = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> ServedPoseOut | Response:
-    """The pose now, how sure it is, and why the state is what it is; or a file of another tool's.
+    """Get the pose of a camera.
 
-    What each of the files holds and leaves out is in the guide to formats.
+    The answer has its uncertainty and the reason for the state. With `format`, it is a file for
+    another tool; the guide to formats lists what each file holds.
     """
     view = poses.view_pose(session, state.settings, camera_id)
     headers = {"ETag": view.etag, **REVALIDATED}
@@ -312,8 +315,11 @@ def show(
 
 
 @router.get("/pose.yaml", response_class=_YamlResponse)
-def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
-    """The served pose with its lens as OpenCV's FileStorage reads it, with homographies."""
+def get_pose_as_opencv_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
+    """Get the pose as an OpenCV YAML file.
+
+    The file has the lens and the homographies between ground and image.
+    """
     view = poses.view_pose(session, state.settings, camera_id)
     return _file(session, view, PoseFormat.OPENCV, None)
 
@@ -321,7 +327,7 @@ def as_yaml(camera_id: str, state: StateDep, session: ReadDep) -> Response:
 def _file(session: Session, view: PoseView, kind: PoseFormat, origin: GeoOrigin | None) -> Response:
     camera_id, estimate = view.status.camera_id, view.status.estimate
     if not view.calibrated:
-        raise ConflictError("pose: nobody has agreed to a prior pose yet")
+        raise ConflictError("pose: no prior pose has been confirmed yet")
     file = pose_file(
         kind,
         cameras.require_camera(session, camera_id).intrinsics,
@@ -347,7 +353,7 @@ def _origin(lat_deg: float | None, lon_deg: float | None) -> GeoOrigin | None:
 
 
 @router.get("/pose/history")
-def history(
+def list_pose_history(
     camera_id: str,
     session: ReadDep,
     from_: Annotated[Moment | None, Query(alias="from")] = None,
@@ -355,9 +361,10 @@ def history(
     limit: Annotated[int | None, Query(ge=1, le=10_000)] = None,
     points: Annotated[int | None, Query(ge=2, le=10_000)] = None,
 ) -> History:
-    """The estimates between two times, oldest first: the newest `limit`, 1,000 if unsaid.
+    """List the estimates of a camera between two times.
 
-    With `points`, at most so many of all of them instead, evenly thinned out: for a chart.
+    They are ordered by time: the newest `limit` of them, 1,000 by default. With `points`, all
+    estimates are thinned out evenly to at most that number, for a chart.
     """
     if points is not None and limit is not None:
         raise MalformedError.of_field("points", "either limit or points is taken")
@@ -367,43 +374,58 @@ def history(
     return History(items=[HistoryPoint.from_record(record) for record in records])
 
 
-@router.post("/pose/agree")
-def agree(
-    camera_id: str, state: StateDep, session: WriteDep, body: AgreeBody | None = None
+@router.post("/pose/confirm")
+def confirm_pose(
+    camera_id: str, state: StateDep, session: WriteDep, body: ConfirmBody | None = None
 ) -> ServedPoseOut:
-    """Make the pose that people told of a camera its prior pose, as sure as it is."""
-    return _decide(decisions.agree_pose, state, session, camera_id, body)
+    """Confirm the proposed pose.
+
+    It becomes the prior pose, with its uncertainty.
+    """
+    return _decide(decisions.confirm_pose, state, session, camera_id, body)
 
 
 @router.post("/pose/accept")
-def accept(
+def accept_pose(
     camera_id: str, state: StateDep, session: WriteDep, body: AcceptBody | None = None
 ) -> ServedPoseOut:
-    """Make the served pose the new prior pose and close its alerts; a new reference begins."""
+    """Accept the served pose as the new prior pose.
+
+    The alerts about the pose are closed, and a new reference begins.
+    """
     return _decide(decisions.accept_pose, state, session, camera_id, body)
 
 
 @router.post("/pose/put-back")
-def put_back(
+def put_pose_back(
     camera_id: str, state: StateDep, session: WriteDep, body: PutBackBody | None = None
 ) -> ServedPoseOut:
-    """Say that the camera is back at its prior pose: closes its alerts; its reference holds."""
+    """Report that a camera is back at its prior pose.
+
+    The alerts about the pose are closed. The learned reference is kept.
+    """
     return _decide(decisions.put_back, state, session, camera_id, body)
 
 
 @router.post("/pose/undo")
-def undo(
+def undo_answer_about_pose(
     camera_id: str, state: StateDep, session: WriteDep, body: UndoBody | None = None
 ) -> ServedPoseOut:
-    """Take the last answer about the pose back, for 15 minutes and until something hangs on it."""
+    """Undo the last answer about the pose.
+
+    This is possible for 15 minutes, unless a later change depends on the answer.
+    """
     return _decide(undo_answer, state, session, camera_id, body)
 
 
 @router.post("/reference/reset")
-def reset(
+def reset_reference(
     camera_id: str, state: StateDep, session: WriteDep, body: ResetBody | None = None
 ) -> ServedPoseOut:
-    """Say that the camera is at its prior pose and learn anew there; closes its alerts."""
+    """Start a new reference at the prior pose.
+
+    The camera has to be at its prior pose. The alerts about the pose are closed.
+    """
     return _decide(decisions.learn_anew, state, session, camera_id, body)
 
 

@@ -15,7 +15,7 @@ router = APIRouter(tags=["operation"])
 
 
 @router.get("/reports/weekly")
-def weekly(
+def get_weekly_report(
     state: StateDep,
     session: ReadDep,
     from_: Annotated[
@@ -23,7 +23,10 @@ def weekly(
     ] = None,
     to: Annotated[Moment | None, Query(description="now, if not given")] = None,
 ) -> Report:
-    """A report of any days: the alerts that were open then, and cameras as they stand now."""
+    """Get a report of several days.
+
+    It has the alerts that were open during these days, and the current state of the cameras.
+    """
     end = to or datetime.now(UTC)
     begin = from_ or end - WEEK
     require_period(begin, end)

@@ -341,7 +341,7 @@ POSE_FIELDS = {
 }
 
 
-class RivalOut(BaseModel):
+class AlternativeOut(BaseModel):
     """Another pose that explains the tracks: its weight among all that do."""
 
     height_m: float

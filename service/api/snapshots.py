@@ -49,16 +49,17 @@ def read_body(camera_id: str, request: Request, body: BodyDep, state: StateDep) 
 
 
 @router.put("", openapi_extra=IMAGE_BODY)
-def put(
+def put_snapshot(
     camera_id: str,
     still: Annotated[Still, Depends(read_body)],
     state: StateDep,
     write: WritesDep,
     taken_at: Annotated[Moment | None, Query(description="now, if not given")] = None,
 ) -> SnapshotOut:
-    """Take a still image of what the camera sees, made anew without EXIF, at most 1920 px wide.
+    """Store an image of a camera.
 
-    It is compared with the pictures before it, and kept where the settings say so.
+    The image is compared with earlier ones, and stored if the settings allow it: without EXIF, at
+    most 1920 px wide.
     """
     with write(camera_id) as session:
         facts = snapshots.put_snapshot(session, state.queue, camera_id, still, taken_at)
@@ -66,7 +67,7 @@ def put(
 
 
 @router.get("", response_class=Response, responses=IMAGE_ANSWER)
-def show(
+def get_snapshot(
     camera_id: str,
     state: StateDep,
     session: ReadDep,
@@ -75,7 +76,10 @@ def show(
         bool, Query(description="the newest by which it stood at its prior pose")
     ] = False,
 ) -> Response:
-    """The newest still image of a camera, or the newest by which it stood."""
+    """Get the image of a camera.
+
+    It is the newest one, or the newest one from before a move.
+    """
     if stood:
         jpeg = snapshots.show_stood(session, state.settings, camera_id)
     else:
@@ -93,6 +97,6 @@ def jpeg_answer(jpeg: bytes, if_none_match: str | None) -> Response:
 
 
 @router.delete("", status_code=204)
-def remove(camera_id: str, session: WriteDep) -> None:
-    """Delete the still image of a camera; it goes with its camera, too."""
+def delete_snapshot(camera_id: str, session: WriteDep) -> None:
+    """Delete the image of a camera."""
     snapshots.remove_snapshot(session, camera_id)

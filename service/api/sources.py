@@ -13,16 +13,17 @@ from service.store.access import name_in
 
 
 class UseBody(Body):
-    """Who says that a source is to count."""
+    """The caller that activates a source."""
 
     by: Who | None = None
 
 
 class SourceOut(Out):
-    """A source of tracks; `usable_tracks` of `wanted_tracks` would make a reference of it.
+    """A source of tracks: `usable_tracks` of the `wanted_tracks` for a reference are available.
 
-    `token_id` is of the token whose name it is; null where access was off. `size` or `normalised`
-    are declared for its posts that state no image size (`PATCH /cameras/{id}`).
+    `counts` is true for the active source. `token_id` is the token with the source's name; null if
+    access control was off. `size` or `normalised` are declared for its posts that state no image
+    size (`PATCH /cameras/{id}`).
     """
 
     name: str
@@ -38,7 +39,7 @@ class SourceOut(Out):
 
 
 class SourceList(BaseModel):
-    """Sources, the first to post first."""
+    """Sources, ordered by their first post."""
 
     items: list[SourceOut]
 
@@ -47,8 +48,11 @@ router = APIRouter(prefix="/cameras/{camera_id}/sources", tags=["tracks"], route
 
 
 @router.get("")
-def list_all(camera_id: str, state: StateDep, session: ReadDep) -> SourceList:
-    """Who has posted tracks of a camera, and whose count."""
+def list_sources(camera_id: str, state: StateDep, session: ReadDep) -> SourceList:
+    """List the sources of a camera's tracks.
+
+    `counts` marks the active source.
+    """
     found = sources.list_sources(session, state.settings, camera_id)
     items = [
         SourceOut.of(
@@ -65,20 +69,23 @@ def list_all(camera_id: str, state: StateDep, session: ReadDep) -> SourceList:
 
 
 @router.post("/{source:path}/use")
-def use(
+def activate_source(
     camera_id: str,
     source: str,
     state: StateDep,
     session: WriteDep,
     body: UseBody | None = None,
 ) -> SourceList:
-    """Say that a source is to count: the reference is learned anew, of its tracks."""
+    """Activate a source of tracks.
+
+    The reference is learned again from its tracks.
+    """
     by = name_in(session, None if body is None else body.by)
     sources.use_source(session, state.queue, state.settings, camera_id, source, by)
-    return list_all(camera_id, state, session)
+    return list_sources(camera_id, state, session)
 
 
 @router.delete("/{source:path}", status_code=204)
-def remove(camera_id: str, source: str, session: WriteDep, by: Text | None = None) -> None:
-    """Delete a source that does not count, with its tracks."""
+def delete_source(camera_id: str, source: str, session: WriteDep, by: Text | None = None) -> None:
+    """Delete an inactive source with its tracks."""
     sources.remove_source(session, camera_id, source, name_in(session, by))

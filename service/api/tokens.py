@@ -69,8 +69,11 @@ router = APIRouter(prefix="/tokens", tags=["access"])
 
 
 @router.post("", status_code=201)
-def create(body: TokenBody, session: WriteDep, response: Response) -> TokenMade:
-    """Make a token. It is in this answer and in no other."""
+def create_token(body: TokenBody, session: WriteDep, response: Response) -> TokenMade:
+    """Create a token.
+
+    Its value is in this answer only.
+    """
     spec = TokenSpec(**body.model_dump())
     made = tokens.make_token(session, spec, name_in(session, None))
     response.headers["Location"] = "/tokens"
@@ -78,12 +81,15 @@ def create(body: TokenBody, session: WriteDep, response: Response) -> TokenMade:
 
 
 @router.get("")
-def list_all(session: ReadDep) -> TokenList:
-    """Tokens, oldest first; those that were revoked, too."""
+def list_tokens(session: ReadDep) -> TokenList:
+    """List the tokens, oldest first, including revoked ones."""
     return TokenList(items=[TokenOut.from_record(record) for record in access.every(session)])
 
 
 @router.delete("/{token_id}", status_code=204)
-def revoke(token_id: str, session: WriteDep) -> None:
-    """Let a token in no more; pages that logged in with it are logged out."""
+def revoke_token(token_id: str, session: WriteDep) -> None:
+    """Revoke a token.
+
+    Pages that logged in with it are logged out.
+    """
     tokens.revoke_token(session, token_id, name_in(session, None))

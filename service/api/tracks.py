@@ -306,8 +306,9 @@ def post_tracks(
     state: StateDep,
     caller: CallerDep,
 ) -> Response:
-    """Store tracks. One bad track never loses the others; 202 means that they are on disk.
+    """Post tracks of a camera.
 
-    422 where there were tracks and none of them could be taken.
+    One invalid track does not reject the others. 202 means that the tracks are stored on disk; 422
+    means that there were tracks and all of them are invalid.
     """
     return _take(state, camera_id, came, caller)

@@ -74,13 +74,13 @@ router = APIRouter(tags=["trainings"], route_class=NamingRoute)
 
 
 @router.post("/cameras/{camera_id}/trainings", status_code=202)
-def request(
+def start_training(
     camera_id: str,
     state: StateDep,
     session: WriteDep,
     body: TrainingBody | None = None,
 ) -> TrainingOut:
-    """Queue a training at the camera's prior pose."""
+    """Queue a training at the prior pose of a camera."""
     body = body or TrainingBody()
     by = name_in(session, body.by)
     record = training.request_training(
@@ -90,21 +90,24 @@ def request(
 
 
 @router.get("/cameras/{camera_id}/trainings")
-def list_all(
+def list_trainings(
     camera_id: str, session: ReadDep, limit: Annotated[int, Query(ge=1, le=1000)] = 100
 ) -> TrainingList:
-    """A camera's trainings, newest first."""
+    """List the trainings of a camera, newest first."""
     records = training.list_trainings(session, camera_id, limit)
     return TrainingList(items=[TrainingOut.from_record(record) for record in records])
 
 
 @router.get("/trainings/{training_id}")
-def show(training_id: str, session: ReadDep) -> TrainingOut:
-    """A training with its progress."""
+def get_training(training_id: str, session: ReadDep) -> TrainingOut:
+    """Get a training with its progress."""
     return TrainingOut.from_record(training.show_training(session, training_id))
 
 
 @router.delete("/trainings/{training_id}", status_code=202)
-def cancel(training_id: str, session: WriteDep) -> TrainingOut:
-    """Cancel a training: a queued one at once, a running one within a second or so."""
+def cancel_training(training_id: str, session: WriteDep) -> TrainingOut:
+    """Cancel a training.
+
+    A queued one ends at once, a running one within a second or so.
+    """
     return TrainingOut.from_record(training.cancel_training(session, training_id))

@@ -151,10 +151,13 @@ CheckedPatch = Annotated[WebhookPatch, Depends(checked_patch)]
 
 
 @router.post("/webhooks", status_code=201)
-def create(
+def create_webhook(
     body: CheckedBody, state: StateDep, session: WriteDep, response: Response
 ) -> WebhookMade:
-    """Create a webhook. Its secret is in this answer and in no other."""
+    """Create a webhook.
+
+    Its secret is in this answer only.
+    """
     spec = WebhookSpec(**body.model_dump())
     made = webhooks.create_webhook(session, state.settings, spec)
     response.headers["Location"] = f"/webhooks/{made.record.id}"
@@ -162,40 +165,51 @@ def create(
 
 
 @router.get("/webhooks")
-def list_all(session: ReadDep) -> WebhookList:
-    """Webhooks, oldest first."""
+def list_webhooks(session: ReadDep) -> WebhookList:
+    """List the webhooks, oldest first."""
     return WebhookList(items=[_shown(view) for view in webhooks.list_webhooks(session)])
 
 
 @router.get("/webhooks/{webhook_id}")
-def show(webhook_id: str, session: ReadDep) -> WebhookOut:
-    """A webhook, and how it fares."""
+def get_webhook(webhook_id: str, session: ReadDep) -> WebhookOut:
+    """Get a webhook with the state of its deliveries."""
     return _shown(webhooks.show_webhook(session, webhook_id))
 
 
 @router.patch("/webhooks/{webhook_id}")
-def change(webhook_id: str, body: CheckedPatch, state: StateDep, session: WriteDep) -> WebhookOut:
-    """Change a webhook; with another URL, or enabled again, it is sent what waits for it."""
+def change_webhook(
+    webhook_id: str, body: CheckedPatch, state: StateDep, session: WriteDep
+) -> WebhookOut:
+    """Change a webhook.
+
+    With another URL, or enabled again, it receives the deliveries that are waiting.
+    """
     changes = body.model_dump(exclude_unset=True)
     return _shown(webhooks.change_webhook(session, state.queue, webhook_id, changes))
 
 
 @router.delete("/webhooks/{webhook_id}", status_code=204)
-def remove(webhook_id: str, session: WriteDep) -> None:
+def delete_webhook(webhook_id: str, session: WriteDep) -> None:
     """Delete a webhook with its deliveries."""
     webhooks.remove_webhook(session, webhook_id)
 
 
 @router.post("/webhooks/{webhook_id}/secret")
-def rotate(webhook_id: str, state: StateDep, session: WriteDep) -> SecretOut:
-    """Give a webhook a new secret; for a day, messages are signed with the old one, too."""
+def rotate_webhook_secret(webhook_id: str, state: StateDep, session: WriteDep) -> SecretOut:
+    """Replace the secret of a webhook.
+
+    For one day, messages are signed with the former secret, too.
+    """
     made = webhooks.rotate_secret(session, state.settings, webhook_id)
     return SecretOut.of(made.record, secret=made.secret)
 
 
 @router.post("/webhooks/{webhook_id}/test", status_code=202)
-def test(webhook_id: str, session: WriteDep) -> DeliveryOut:
-    """Queue a message of the type `test`."""
+def test_webhook(webhook_id: str, session: WriteDep) -> DeliveryOut:
+    """Send a test message to a webhook.
+
+    A message of the type `test` is queued.
+    """
     return DeliveryOut.from_record(webhooks.test_webhook(session, webhook_id))
 
 
@@ -206,20 +220,26 @@ def list_deliveries(
     state: DeliveryState | None = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> DeliveryList:
-    """What was sent or is to be, newest first, with every attempt."""
+    """List the deliveries of a webhook, newest first.
+
+    Each has its attempts; pending ones are included.
+    """
     records = webhooks.list_deliveries(session, webhook_id, state, limit)
     return DeliveryList(items=[DeliveryOut.from_record(record) for record in records])
 
 
 @router.get("/deliveries/{delivery_id}")
-def show_delivery(delivery_id: str, session: ReadDep) -> DeliveryOut:
-    """A delivery with its attempts."""
+def get_delivery(delivery_id: str, session: ReadDep) -> DeliveryOut:
+    """Get a delivery with its attempts."""
     return DeliveryOut.from_record(webhooks.show_delivery(session, delivery_id))
 
 
 @router.post("/deliveries/{delivery_id}/replay", status_code=202)
-def replay(delivery_id: str, state: StateDep, session: WriteDep) -> DeliveryOut:
-    """Send a delivery anew, at once and under the same `webhook-id`."""
+def replay_delivery(delivery_id: str, state: StateDep, session: WriteDep) -> DeliveryOut:
+    """Send a delivery again.
+
+    It is sent at once, with the same `webhook-id`.
+    """
     return DeliveryOut.from_record(webhooks.replay_delivery(session, state.queue, delivery_id))
 
 

@@ -154,10 +154,14 @@ _FILES: dict[str, Any] = {kind: {} for kind in sorted(_TYPES)}
 
 
 @router.get("", response_model=ZonesOut, responses={200: {"content": _FILES}})
-def show(
+def get_zones(
     camera_id: str, session: ReadDep, response: Response, format_: _Format = None
 ) -> ZonesOut | Response:
-    """Zones as they were drawn and where they are; or a file for another system, mended."""
+    """Get the zones of a camera.
+
+    Each is as drawn and at its current place. With `format`, the answer is a configuration for
+    another system with the corrected zones.
+    """
     view = zones.view_zones(session, camera_id)
     headers = {"ETag": view.etag}
     if format_ is None:
@@ -170,7 +174,7 @@ def show(
 
 
 @router.put("", openapi_extra=_DESCRIBED_BODY, responses={200: {"headers": ETAG}})
-def put(
+def put_zones(
     camera_id: str,
     request: Request,
     body: BodyDep,
@@ -184,9 +188,10 @@ def put(
         Moment | None, Query(description="when they were drawn, by the pose that held; now")
     ] = None,
 ) -> ZonesOut:
-    """Replace the zones: by our JSON, GeoJSON, or a configuration of Frigate or Axis.
+    """Replace the zones of a camera.
 
-    The media type selects the format; of plain JSON `format` does.
+    The body is our JSON, GeoJSON, or a configuration of Frigate or Axis. The media type selects the
+    format; for `application/json`, `format` does. The first zones need no `If-Match`.
     """
     media_type = media_type_of(request)
     if media_type not in _TYPES:

@@ -52,12 +52,12 @@ def aim_target(session: Session, camera_id: str) -> AimTarget:
 
     Raises:
         NotFoundError: there is no such camera.
-        ConflictError: nobody has agreed to a prior pose.
+        ConflictError: no prior pose has been confirmed.
     """
     camera = require_camera(session, camera_id)
     prior = cameras.prior_pose(session, camera_id)
     if prior.assumed:
-        raise ConflictError("pose: nobody has agreed to a prior pose yet")
+        raise ConflictError("pose: no prior pose has been confirmed yet")
     return AimTarget(
         intrinsics=camera.intrinsics,
         gallery=tuple(each.features for each in pictures.gallery(session, prior.id)),

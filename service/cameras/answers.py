@@ -13,7 +13,7 @@ from service.store.zones import ZonesRecord
 ANSWERS = (
     Activity.POSE_ACCEPTED,
     Activity.POSE_PUT_BACK,
-    Activity.POSE_MENDED,
+    Activity.POSE_FIXED,
     Activity.POSE_FALSE_ALARM,
     Activity.REFERENCE_RESET,
 )

@@ -153,7 +153,7 @@ def register_camera(
         reference_tracks=spec.reference_tracks,
         version=1,
         estimate_due_at=None,
-        looked_at_pk=None,
+        read_track_pk=None,
         checked_at=None,
         full_estimate_asked=False,
         created_at=now,

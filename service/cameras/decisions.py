@@ -1,4 +1,4 @@
-"""Answers of a person: a camera's pose is agreed to, accepted, it was put back, it never moved.
+"""Operators' answers about a pose: confirmed, accepted, put back, false alarm.
 
 Each closes the alerts about the pose, keeps who said it, and ends what was estimated before.
 """
@@ -37,7 +37,7 @@ def accept_pose(
         if wrong is not None:
             raise ConflictError(
                 f"pose: its {kind} looks wrong, and a wrong {kind} looks like another height: end "
-                f"alert {wrong.id} first, as mended or false_alarm"
+                f"alert {wrong.id} first, as fixed or false_alarm"
             )
     if not view.status.identifiable:
         raise ConflictError(f"pose: there is no estimate to accept: {view.reason}")
@@ -59,25 +59,25 @@ def accept_pose(
     return view_pose(session, settings, decision.camera_id)
 
 
-def agree_pose(
+def confirm_pose(
     session: Session, queue: JobQueue, settings: Settings, decision: Decision
 ) -> PoseView:
-    """Make the pose that people told of a camera its prior pose, as sure as it is.
+    """Make the proposed pose the prior pose, with its uncertainty.
 
-    Whoever was seen so far was seen from there: the reference begins with them.
+    The reference includes the tracks that were collected so far: the camera has not moved since.
 
     Raises:
-        NotFoundError: there is no such camera.
-        ConflictError: it has a prior pose, or people do not tell one yet.
+        NotFoundError: unknown camera.
+        ConflictError: the camera has a prior pose, or the proposed pose is not certain enough.
     """
     camera_id = decision.camera_id
     view = view_pose(session, settings, camera_id)
     proposed = view.proposed
     if view.calibrated or proposed is None or not proposed.told:
         why = "it has a prior pose already" if view.calibrated else view.reason
-        raise ConflictError(f"pose: there is nothing to agree to: {why}")
+        raise ConflictError(f"pose: no pose can be confirmed: {why}")
     note_activity(
-        session, Activity.POSE_AGREED, by=decision.by, camera_id=camera_id, text=decision.note
+        session, Activity.POSE_CONFIRMED, by=decision.by, camera_id=camera_id, text=decision.note
     )
     held = held_pose(session, camera_id)
     renew_prior_pose(
@@ -86,7 +86,7 @@ def agree_pose(
         settings,
         camera_id,
         proposed.pose,
-        Origin.AGREED,
+        Origin.CONFIRMED,
         from_s=view.status.reference.from_s,
         by=decision.by,
         covariance=proposed.covariance,

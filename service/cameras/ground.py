@@ -22,7 +22,7 @@ def places_of_pixels(
     from +Y, like a heading. None where nothing says how sure the pose is.
 
     Raises:
-        ConflictError: nobody has said or agreed to a pose.
+        ConflictError: no prior pose has been confirmed.
     """
     _require_known(held)
     rays, _ = intrinsics.rays(uv)
@@ -66,4 +66,4 @@ def pixels_of_places(
 
 def _require_known(held: HeldPose) -> None:
     if held.assumed:
-        raise ConflictError("pose: nobody has agreed to a prior pose yet")
+        raise ConflictError("pose: no prior pose has been confirmed yet")

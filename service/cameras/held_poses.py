@@ -79,10 +79,11 @@ def drawn_since_move(record: ZonesRecord, held: HeldPose) -> bool:
 
 
 def keep_drawn(session: Session, camera_id: str, held: HeldPose) -> None:
-    """Have zones stand as drawn at a new prior pose, where the camera stood when they were drawn.
+    """Keep the zones as drawn at a new prior pose if the camera has not moved since.
 
-    That is so of zones since the drift whose pose is accepted, by an estimate of it: each one is a
-    little elsewhere, and the camera was not. And of those from before anybody had agreed to a pose.
+    That applies to zones drawn since the drift whose pose is accepted: the new prior pose is an
+    estimate of the position in which they were drawn. It also applies to zones drawn before the
+    first pose was confirmed.
 
     Args:
         session: of a store.

@@ -50,7 +50,7 @@ def keep_hints(session: Session, camera_id: str, kept: list[dict[str, Any]]) -> 
         raise ConflictError("hints: the camera has a prior pose already")
     prior.hints = kept
     proposed = proposal_of(session, prior, lens)
-    if kept and (proposed is None or proposed.off_sd is None):
+    if kept and (proposed is None or proposed.residual_sd is None):
         raise MalformedError.of_field(
             "hints", "they fit no pose: one that should be on the ground is above the horizon"
         )

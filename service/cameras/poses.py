@@ -32,8 +32,8 @@ from service.wording.reasons import in_words
 class PoseView:
     """The served pose of a camera, and its status.
 
-    `calibrated` once somebody has said or agreed to a prior pose; until then `proposed` is what
-    people told of it, and None where there were too few. `question` is open about the image size
+    `calibrated` is true once a prior pose was given or confirmed; until then `proposed` is the pose
+    estimated from tracks, None if there are too few. `question` is open about the image size
     of its tracks, until which nothing is learned from them. `estimates` are those of each
     estimator, and of the newest image that was compared.
     """
@@ -173,7 +173,7 @@ def _of_alerts(status: CameraStatus) -> list[Reason]:
 def _why_uncalibrated(
     status: CameraStatus, learned: ReferenceView, proposed: Proposal | None
 ) -> Reason:
-    """What is missing until somebody can agree to a pose, or that somebody has to."""
+    """The reason why the camera has no prior pose: too few tracks, or not yet confirmed."""
     if proposed is None:
         seen = {"tracks": learned.tracks, "least_walkers": FEWEST_WALKERS}
         return Reason(code=ServiceCode.POSE_UNKNOWN, values=seen)

@@ -12,7 +12,7 @@ from models.geometry.hints import Hint, HintKind, with_hints
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import PLANE_PARAMETERS, CameraPose, plane_parameters_of
 from models.geometry.rotation import Array
-from models.geometry.usual_pose import AGREED_SD, measured_precision, usual_pose, usual_sd
+from models.geometry.usual_pose import CONFIRMABLE_SD, measured_precision, usual_pose, usual_sd
 from service.store import cameras
 from service.store.cameras import PriorPoseRecord, ProposedPoseRecord
 
@@ -21,11 +21,11 @@ _UNTOLD = 9.0  # times the variance of people who do not tell enough
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """A pose to agree to, of so many tracks and hints.
+    """A proposed pose, estimated from tracks and hints, that an operator can confirm.
 
     `covariance` (3, 3) is of tilt, roll and log height; `sd` in radians and metres, of the heading,
-    too, where a map tells it. `off_sd` is how far each hint is off, in its own standard deviations;
-    None where they do not fit any pose.
+    too, where a map tells it. `residual_sd` is the residual of each hint in its own
+    standard deviations; None if no pose fits the hints.
     """
 
     pose: CameraPose
@@ -34,12 +34,12 @@ class Proposal:
     identifiable: tuple[str, ...]
     tracks: int
     walking_groups: int
-    off_sd: tuple[float, ...] | None
+    residual_sd: tuple[float, ...] | None
     updated_at: datetime
 
     @property
     def told(self) -> bool:
-        """True where there is enough to agree to."""
+        """True if the pose is certain enough to be confirmed."""
         return len(self.identifiable) == len(PLANE_PARAMETERS)
 
 
@@ -52,18 +52,18 @@ def proposal_of(
     if people is None and not hints:
         return None
     mean, known = _known(prior, people)
-    off_sd: tuple[float, ...] | None
+    residual_sd: tuple[float, ...] | None
     try:
         found = with_hints(mean, known, hints, intrinsics)
-        off_sd = found.off_sd
+        residual_sd = found.residual_sd
     except (DegenerateGeometryError, np.linalg.LinAlgError):
         if people is None:
             return None
-        hints, off_sd = [], None
+        hints, residual_sd = [], None
         found = with_hints(mean, known, hints, intrinsics)
     sd = np.sqrt(np.diag(found.covariance))
     if hints or people is None:
-        named = zip(PLANE_PARAMETERS, sd[:3] <= AGREED_SD, strict=True)
+        named = zip(PLANE_PARAMETERS, sd[:3] <= CONFIRMABLE_SD, strict=True)
         identifiable = tuple(name for name, known_well in named if known_well)
     else:
         identifiable = tuple(people.identifiable)
@@ -78,7 +78,7 @@ def proposal_of(
         identifiable=identifiable,
         tracks=0 if people is None else people.tracks,
         walking_groups=0 if people is None else people.walking_groups,
-        off_sd=off_sd,
+        residual_sd=residual_sd,
         updated_at=prior.created_at if people is None else people.created_at,
     )
 

@@ -115,7 +115,9 @@ def list_sources(session: Session, settings: Settings, camera_id: str) -> list[S
     ]
 
 
-def rival_sources(session: Session, settings: Settings, camera_id: str) -> tuple[SourceView, ...]:
+def selectable_sources(
+    session: Session, settings: Settings, camera_id: str
+) -> tuple[SourceView, ...]:
     """The sources of a camera; none where there is but one, which nobody has to choose."""
     if len(sources.of_camera(session, camera_id)) < 2:
         return ()

@@ -22,7 +22,7 @@ from service.store.alerts import MOVED_KINDS, AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.references import MaintenanceRecord, SiteReferenceRecord
 
-_ANSWERED = (Cause.PUT_BACK, Cause.MENDED, Cause.FALSE_ALARM)
+_ANSWERED = (Cause.PUT_BACK, Cause.FIXED, Cause.FALSE_ALARM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,7 +33,7 @@ UNDO_WITHIN = timedelta(minutes=15)  # people who came since tell by then, and l
 _BARRIERS = (
     Activity.CAMERA_REGISTERED,  # another may have had the id before
     Activity.POSE_UNDONE,
-    Activity.POSE_AGREED,
+    Activity.POSE_CONFIRMED,
     Activity.CAMERA_CHANGED,
     Activity.REFERENCE_LEARNED,
     Activity.SOURCE_USED,

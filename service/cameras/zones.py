@@ -102,7 +102,7 @@ def draw_zones(
     Args:
         session: of a store.
         camera_id: the camera.
-        etag: the version that the client read.
+        etag: the version that the client read; not needed for the first zones.
         kind: the format of the document; None is our own JSON.
         document: as `read_document` made it.
         on: surface of zones that do not name one.
@@ -112,11 +112,12 @@ def draw_zones(
         NotFoundError: unknown camera.
         MalformedError: the document has no usable zones.
         PreconditionFailedError: the zones changed since the client read them.
-        PreconditionRequiredError: no version was named.
+        PreconditionRequiredError: the camera has zones and `etag` is None.
     """
     lens = require_camera(session, camera_id).intrinsics
     record = zones.of_camera(session, camera_id)
-    check_version("the zones are", _etag(camera_id, record), etag)
+    if record is not None or etag is not None:  # otherwise no zones can be overwritten
+        check_version("the zones are", _etag(camera_id, record), etag)
     drawn = read_zones(kind, document, (lens.width, lens.height), on)
     for zone in drawn:
         _check_seen(zone, lens)

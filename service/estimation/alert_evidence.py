@@ -28,7 +28,7 @@ def alert_evidence(found: ComputedEstimate, prior: CameraPose) -> dict[str, Any]
         "offset_sd": asdict(PoseParameters.sd_of_array(fused.covariance, prior.height_m)),
         "registered": fused.registered,
         "prior_loss_sd": fused.prior_loss,
-        "rivals": rivals_of(fused),
+        "alternatives": alternatives_of(fused),
         "chart": _picked(assessment.chart, "statistic", "level", "walking_groups"),
         "creep": _picked(assessment.slow_drift, "statistic", "level"),
     }
@@ -46,7 +46,7 @@ def told_by(posterior: PosePosterior, offset: Array, zones: MovedZones | None) -
         "offset": _named(offset, prior),
         "registered": False,
         "prior_loss_sd": 0.0,
-        "rivals": [],
+        "alternatives": [],
         "chart": None,
         "creep": None,
         "zones": None if zones is None else asdict(zones),
@@ -57,15 +57,15 @@ def _picked(result: object | None, *names: str) -> dict[str, Any] | None:
     return None if result is None else {name: getattr(result, name) for name in names}
 
 
-def rivals_of(fused: FusedEstimate) -> list[dict[str, Any]]:
+def alternatives_of(fused: FusedEstimate) -> list[dict[str, Any]]:
     """Other poses that explain the tracks, each with its weight among all that do."""
     return [
-        {**asdict(PoseParameters.of_array(rival.values)), "weight": rival.weight}
-        for rival in fused.rivals
+        {**asdict(PoseParameters.of_array(alternative.values)), "weight": alternative.weight}
+        for alternative in fused.alternatives
     ]
 
 
-def would_notice(power: Array | None, prior: CameraPose) -> dict[str, Any]:
+def detectable(power: Array | None, prior: CameraPose) -> dict[str, Any]:
     """The smallest move in each parameter that is told of so many people; None where none is."""
     if power is None:
         return {}

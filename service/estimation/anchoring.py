@@ -6,7 +6,7 @@ from datetime import datetime
 
 from sqlalchemy.orm import Session
 
-from models.assessment import begin_creep_log, log_creep
+from models.assessment import begin_slow_drift_log, log_slow_drift
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
@@ -14,12 +14,12 @@ from models.pose import (
     CameraSite,
     chart_from_bytes,
     chart_to_bytes,
-    creep_log_from_bytes,
-    creep_log_to_bytes,
     observe,
     paths_from_bytes,
     paths_to_bytes,
     reference_from_bytes,
+    slow_drift_log_from_bytes,
+    slow_drift_log_to_bytes,
 )
 from models.tracks.trajectory import Trajectory
 from service.estimation.evidence import Anchor, Unpacked, anchor_of
@@ -129,13 +129,13 @@ def compute_anchor_days(days: AnchorDays) -> bytes | None:
         days.anchor,
     )
     kept = days.anchor.record
-    log = None if kept.creep is None else creep_log_from_bytes(kept.creep)
-    log = log or begin_creep_log(first, kept.to_s)
+    log = None if kept.creep is None else slow_drift_log_from_bytes(kept.creep)
+    log = log or begin_slow_drift_log(first, kept.to_s)
     if log is None:
         return None
     if days.trajectories:
-        log = log_creep(log, observe(days.trajectories, days.intrinsics, days.prior), first)
-    return creep_log_to_bytes(log)
+        log = log_slow_drift(log, observe(days.trajectories, days.intrinsics, days.prior), first)
+    return slow_drift_log_to_bytes(log)
 
 
 def save_anchor_days(session: Session, days: AnchorDays, log: bytes | None) -> None:

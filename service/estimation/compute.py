@@ -26,9 +26,9 @@ from models.pose import (
     PartialFailure,
     WarmStart,
     chart_from_bytes,
-    creep_log_from_bytes,
     paths_from_bytes,
     reference_from_bytes,
+    slow_drift_log_from_bytes,
     unless_failed,
     warm_start_from_bytes,
     warm_start_to_bytes,
@@ -174,7 +174,7 @@ def _baseline(evidence: Evidence) -> Baseline | None:
     return Baseline(
         paths=paths_from_bytes(anchor.record.flow),
         chart=chart_from_bytes(anchor.record.chart),
-        days=creep_log_from_bytes(anchor.record.creep),
+        days=slow_drift_log_from_bytes(anchor.record.creep),
         from_s=anchor.from_s,
     )
 

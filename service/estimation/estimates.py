@@ -14,7 +14,7 @@ from service.alerts.alerts import end_alert, open_alert
 from service.degrees import in_degrees
 from service.enums import AlertKind, EventType, Outcome, PoseState, Severity
 from service.estimate_queue import request_estimate
-from service.estimation.alert_evidence import alert_evidence, rivals_of, would_notice
+from service.estimation.alert_evidence import alert_evidence, alternatives_of, detectable
 from service.estimation.carried_state import carried_state, last_estimate
 from service.estimation.compute import ComputedEstimate
 from service.estimation.evidence import Evidence
@@ -214,8 +214,8 @@ def _record(
         reasons,
         model_id=evidence.model_id,
         suspected=chart is not None and chart.suspicious,
-        rivals=rivals_of(fused),
-        would_notice=would_notice(assessment.detectable, evidence.prior),
+        alternatives=alternatives_of(fused),
+        detectable=detectable(assessment.detectable, evidence.prior),
         raw=_raw(evidence, found),
         tracks=len(found.tracks),
         from_s=min(track.started_s for track in found.tracks),

@@ -24,13 +24,13 @@ from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, trainings, windows, zones
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
-from service.store.look_budget import LookBudget
 from service.store.references import (
     AnchorRecord,
     FlowMapRecord,
     LastPoseRecord,
     SiteReferenceRecord,
 )
+from service.store.run_budget import RunBudget
 from service.store.tracks import StoredTrack, seen_of, trajectory_of
 from service.store.trainings import ModelRecord
 from service.store.windows import PredictionRecord, WindowBounds
@@ -43,8 +43,8 @@ _Track = tuple[int, datetime, int]
 class Unpacked:
     """A cache of unpacked tracks, and the budget by which they are read; of one look."""
 
-    def __init__(self, budget: LookBudget | None = None) -> None:
-        self.budget = budget or LookBudget()
+    def __init__(self, budget: RunBudget | None = None) -> None:
+        self.budget = budget or RunBudget()
         self._feet: dict[_Track, Trajectory] = {}
         self._seen: dict[_Track, tuple[Intrinsics, Trajectory]] = {}
 
@@ -146,7 +146,7 @@ class SeenTrack:
 class Anchor:
     """The first map and chart of a reference, and its log of whole days.
 
-    The log counts from `from_s` on: since then the camera has stood as it does, but for a creep.
+    The log counts from `from_s` on: since then the camera has moved only by slow drift.
     """
 
     record: AnchorRecord

@@ -11,18 +11,18 @@ from datetime import UTC, datetime
 import numpy as np
 from sqlalchemy.orm import Session
 
-from models.assessment import without_creep
+from models.assessment import without_slow_drift
 from models.durations import DAY_S
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.geometry.rotation import Array
 from models.pose import (
     FEWEST_BESIDE,
-    creep_log_from_bytes,
     learn_site,
     observe,
     paths_from_bytes,
     reference_from_bytes,
+    slow_drift_log_from_bytes,
 )
 from models.tracks.trajectory import Trajectory
 from service.estimation.anchoring import LearnedPaths, keep_paths, paths_of
@@ -40,8 +40,8 @@ from service.references import (
 from service.settings import Settings
 from service.store import alerts, cameras, estimates, references, tracks, windows
 from service.store.cameras import CameraRecord
-from service.store.look_budget import MAP_BUDGETS, LookBudget
 from service.store.references import AnchorRecord, FlowMapRecord, SiteReferenceRecord
+from service.store.run_budget import MAP_BUDGETS, RunBudget
 from service.store.tracks import StoredTrack
 from service.store.windows import StillBounds, WindowBounds
 
@@ -95,7 +95,7 @@ def load_growth(
         attended,
         judged,
         spoilt,
-        LookBudget(MAP_BUDGETS * unpacked.budget.share),
+        RunBudget(MAP_BUDGETS * unpacked.budget.share),
     )
     if found is None:
         return None
@@ -132,7 +132,7 @@ def _still_tracks(
     attended: Attendance,
     judged: WindowBounds,
     spoilt: bool,
-    budget: LookBudget,
+    budget: RunBudget,
 ) -> Sequence[StoredTrack] | None:
     """The tracks that are known to be of a still camera; None where too few of them are new.
 
@@ -169,8 +169,10 @@ def compute_growth(period: GrowthPeriod, seed: int) -> LearnedPaths | None:
     trajectories, weights = period.trajectories, period.weights
     anchor = period.anchor
     if anchor is not None and anchor.record.creep is not None:
-        log = creep_log_from_bytes(anchor.record.creep)
-        stood = without_creep(trajectories, period.intrinsics, period.prior, log, anchor.from_s)
+        log = slow_drift_log_from_bytes(anchor.record.creep)
+        stood = without_slow_drift(
+            trajectories, period.intrinsics, period.prior, log, anchor.from_s
+        )
         # Some have lost their ends by that: another order.
         ends = {n: track.time_s[-1] for n, track in enumerate(stood) if track is not None}
         order = sorted(ends, key=ends.__getitem__)

@@ -173,9 +173,9 @@ def _postable(body: dict[str, Any], severity: str, public_url: str | None) -> di
     if zones := body.get("zones"):
         least = sorted(zones, key=itemgetter("overlap"))[:_ZONES]
         annotations["zones"] = "\n".join(f"{z['id']}: {moved_zone_words(z)}" for z in least)
-        mended = body["mended_zones"]
-        path = f"{(public_url or '').rstrip('/')}{mended['path']}"
-        annotations["mended_zones"] = f"{path} {mended['how']}"
+        corrected = body["corrected_zones"]
+        path = f"{(public_url or '').rstrip('/')}{corrected['path']}"
+        annotations["corrected_zones"] = f"{path} {corrected['how']}"
     # The change is told by the camera's clock. An alert that ended before it began is refused.
     started = min(body["changed_at"] or body["opened_at"], body["opened_at"])
     alert = {"labels": labels, "annotations": annotations, "startsAt": started}

@@ -99,14 +99,14 @@ def alert_body(record: AlertRecord) -> dict[str, Any]:
     }
     moved = (record.evidence or {}).get("zones") or {}
     body["zones"] = moved.get("zones")
-    body["mended_zones"] = mended_zones(record.camera_id, moved["form"]) if moved else None
+    body["corrected_zones"] = corrected_zones(record.camera_id, moved["form"]) if moved else None
     body["since"] = {"after": body.pop("changed_after"), "before": body["changed_at"]}
     body["acknowledged"] = record.acknowledged_at is not None
     body["silenced"] = record.is_silenced(datetime.now(UTC))
     return body
 
 
-def mended_zones(camera_id: str | None, form: str | None) -> dict[str, Any]:
+def corrected_zones(camera_id: str | None, form: str | None) -> dict[str, Any]:
     """Where zones are as they should lie now, in the form that they came in, and what to do."""
     path = f"/cameras/{camera_id}/zones" + (f"?format={form}" if form else "")
     return {"path": path, "format": form, "how": apply_words(form)}

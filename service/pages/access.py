@@ -26,7 +26,7 @@ from service.api.middleware.dependencies import (
 )
 from service.api.middleware.hosts import auth_on
 from service.api.middleware.pages import render
-from service.api.tokens import list_all
+from service.api.tokens import list_tokens
 from service.errors import (
     FieldError,
     ForbiddenError,
@@ -196,7 +196,7 @@ def _tokens_page(
         request,
         "tokens.html",
         422 if wrong else 200,
-        tokens=list_all(session).items,
+        tokens=list_tokens(session).items,
         made=made,
         typed=typed or Form(),
         wrong={error.pointer[1:]: error.reason for error in wrong},

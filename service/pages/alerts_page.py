@@ -20,7 +20,7 @@ from service.pages.bulk import bulk_rule
 from service.store import alerts, fleet, journal
 from service.store.alerts import AlertRecord
 from service.wording import alerts as alert_words
-from service.wording.acts import ACTS
+from service.wording.actions import ACTIONS
 from service.wording.camera import fleet_alert_flags
 from service.wording.language import N_, _
 from service.wording.times import Clock
@@ -82,7 +82,7 @@ def show(
         csv=_csv(asked, chosen.state),
         clock=clock,
         words=alert_words,
-        act_words=ACTS,
+        action_words=ACTIONS,
         rule=bulk_rule(),
         operates=caller is None or caller.may(TokenScope.OPERATE),
         newest_event=newest,

@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from typing import Any
 
-from service.enums import Act, AlertKind
+from service.enums import Action, AlertKind
 from service.store.alerts import MEMBER, MEMBER_KINDS, AlertRecord, answers_of
-from service.wording.acts import ACTS, CHOSEN_AS
+from service.wording.actions import ACTIONS, CHOSEN_AS
 from service.wording.language import _
 
-_OF_ALERTS = (Act.ACKNOWLEDGE, Act.SILENCE)
+_OF_ALERTS = (Action.ACKNOWLEDGE, Action.SILENCE)
 
 
 def kinds_of(alerts: Iterable[AlertRecord]) -> str:
@@ -29,11 +29,11 @@ def bulk_rule() -> dict[str, Any]:
     takes |= {kind: [*answers_of(kind), *_OF_ALERTS] for kind in AlertKind}
     for kind in takes:
         if kind not in MEMBER_KINDS:
-            takes[kind].append(Act.MAINTENANCE)
+            takes[kind].append(Action.MAINTENANCE)
     return {
         "kinds": {
             kind: {"takes": takes[kind], "words": [_(each) for each in words]}
             for kind, words in CHOSEN_AS.items()
         },
-        "done": {act: _(words.done) for act, words in ACTS.items()},
+        "done": {act: _(words.done) for act, words in ACTIONS.items()},
     }

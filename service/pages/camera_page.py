@@ -21,7 +21,7 @@ from service.cameras.cameras import CameraView, view_camera
 from service.cameras.held_poses import drawn_since_move
 from service.cameras.poses import PoseView, view_pose
 from service.cameras.snapshots import image_facts, stood_at
-from service.cameras.sources import SourceView, rival_sources
+from service.cameras.sources import SourceView, selectable_sources
 from service.cameras.undo import UNDO_WITHIN, last_answer
 from service.cameras.zones import ZonesView, view_zones
 from service.degrees import in_degrees
@@ -192,7 +192,7 @@ def view_camera_page(session: Session, settings: Settings, camera_id: str) -> Ca
         windows=tuple(windows[max(over - _PAST_WINDOWS, 0) :]),
         trainings=tuple(trainings.of_camera(session, camera_id, _TRAININGS)),
         activity=tuple(journal.newest_activity(session, camera_id, _ACTIVITY)),
-        sources=rival_sources(session, settings, camera_id),
+        sources=selectable_sources(session, settings, camera_id),
         snapshot=image_facts(session, settings, SnapshotRecord, camera_id),
         stood_at=stood_at(session, settings, camera_id),
         plan=image_facts(session, settings, PlanRecord, camera_id),
@@ -372,7 +372,7 @@ def _frigate(settings: Settings, zones: ZonesView) -> str | None:
 def _flags(page: CameraPage, clock: Clock) -> list[str]:
     """Flags of open alerts and maintenance, each once."""
     until = None if page.attended is None else page.attended.to_at
-    flags = [*camera_words.page_flags(page.camera.record.lacks, until, clock)]
+    flags = [*camera_words.page_flags(page.camera.record.missing_parts, until, clock)]
     for story in page.firing:
         flags += camera_words.page_alert_flags(story.record, story.group, clock)
     return list(dict.fromkeys(flags))

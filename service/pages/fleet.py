@@ -37,7 +37,7 @@ from service.store.estimates import EstimateRecord
 from service.store.fleet import Label
 from service.store.trainings import TrainingRecord
 from service.wording import alerts as alert_words
-from service.wording.acts import ACTS
+from service.wording.actions import ACTIONS
 from service.wording.camera import (
     STATES,
     fleet_alert_flags,
@@ -235,7 +235,7 @@ def show(
         page_size=PAGE,
         groups=groups,
         handovers=_handovers(session),
-        act_words=ACTS,
+        action_words=ACTIONS,
         rule=bulk_rule(),
         **_words(request, state),
     )

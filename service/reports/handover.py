@@ -18,11 +18,11 @@ from service.store import alerts, fleet, journal
 from service.store.alerts import POSE_KINDS, AlertFilter, AlertRecord
 from service.store.journal import ActivityRecord
 from service.store.references import MaintenanceRecord
-from service.wording.alerts import entry_words, is_act
+from service.wording.alerts import entry_words, is_action
 from service.wording.times import Clock
 
 LAST = 20  # handovers: what nobody has taken is among them
-_MOST_ALERTS, _MOST_ACTS = 500, 5_000
+_MOST_ALERTS, _MOST_ACTIONS = 500, 5_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +69,7 @@ def make_shift(session: Session, since: datetime, clock: Clock) -> Shift:
         )
     }
     names = dict(fleet.names(session, None))
-    most = _MOST_ACTS + 1
+    most = _MOST_ACTIONS + 1
     entries = journal.activity_after(session, None, 0, most, since=since, from_newest=True)
     windows = fleet.maintenance_windows(session, None)
     return Shift(
@@ -77,10 +77,10 @@ def make_shift(session: Session, since: datetime, clock: Clock) -> Shift:
             name: [each for each in records[:_MOST_ALERTS] if each.group_id is None]
             for name, records in found.items()
         },
-        deeds=_deeds(entries[:_MOST_ACTS], names, clock),
+        deeds=_deeds(entries[:_MOST_ACTIONS], names, clock),
         maintenance=[each for some in windows.values() for each in some if each.holds(clock.now)],
         names=names,
-        more=len(entries) > _MOST_ACTS or any(len(e) > _MOST_ALERTS for e in found.values()),
+        more=len(entries) > _MOST_ACTIONS or any(len(e) > _MOST_ALERTS for e in found.values()),
     )
 
 
@@ -91,7 +91,7 @@ def _deeds(entries: Sequence[ActivityRecord], names: dict[str, str], clock: Cloc
     for entry in entries:
         # The end of an alert about the pose is told by the answer about its camera.
         ended = entry.what == Activity.ALERT_RESOLVED and entry.camera_id is not None
-        if (ended and entry.kind in POSE_KINDS) or not is_act(entry):
+        if (ended and entry.kind in POSE_KINDS) or not is_action(entry):
             continue
         words = entry_words(entry, clock)
         mine = cameras.setdefault(words, {})

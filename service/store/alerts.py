@@ -121,9 +121,9 @@ MOVED_KINDS = (AlertKind.DRIFT, *SCALE_KINDS)
 POSE_KINDS = (*MOVED_KINDS, AlertKind.UNSURE)  # that hold a camera against its prior pose
 # What came of an alert, of what a person may say of its kind; the first is that it was real.
 _OF_POSE = (Answer.PUT_BACK, Answer.ACCEPTED, Answer.FALSE_ALARM)
-_OF_OTHERS = (Answer.MENDED, Answer.FALSE_ALARM)
+_OF_OTHERS = (Answer.FIXED, Answer.FALSE_ALARM)
 # By which a person says that a camera is at its prior pose, and its clock is right.
-ANSWERS = (Outcome.PUT_BACK, Outcome.MENDED, Outcome.RELEARNED, Outcome.FALSE_ALARM)
+ANSWERS = (Outcome.PUT_BACK, Outcome.FIXED, Outcome.RELEARNED, Outcome.FALSE_ALARM)
 # Of a group's kind, those of the alerts that it is made of.
 MEMBER_KINDS = {
     AlertKind.MANY_MOVED: MOVED_KINDS,

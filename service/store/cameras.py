@@ -47,18 +47,19 @@ from service.store.zones import ZonesRecord
 
 
 class CameraRecord(Record):
-    """A registered camera. `estimate_due_at` is set while tracks wait to be looked at.
+    """A registered camera. `estimate_due_at` is set while tracks wait for an estimation run.
 
-    `looked_at_pk` is the newest track that an estimation run has read, `checked_at` the time of
-    that run; `full_estimate_asked` is whether the next run is to be a full one.
-    `estimate_tries` counts the looks since the last one that came to its end. If they fail,
-    `estimate_error` says why and `estimate_failing_since` since when. None is begun before
-    `estimate_after`. `lacks` says what failed beside the served estimate. A picture is asked of
-    `snapshot_url` at `snapshot_due_at`, at once where that is None; `snapshot_error` is why the
-    last one did not come. `site` is a path, None where nobody has said one.
-    `snapshot_credentials` are sealed with the data directory's key. `snapshot_digest` is set once
-    the host of `snapshot_url` has asked for Digest. `image_sizes` has the declared size (width,
-    height) of the images that a source's numbers belong to, None for shares.
+    `read_track_pk` is the newest track that a run has read, `checked_at` the time of that run;
+    `full_estimate_asked` is true if the next run has to be a full one. `estimate_tries` counts the
+    runs since the last one that finished. If they fail, `estimate_error` is the reason and
+    `estimate_failing_since` the time of the first failure. No run starts before `estimate_after`.
+    `missing_parts` has the failures beside the served estimate.
+
+    The next image is requested from `snapshot_url` at `snapshot_due_at`, at once if that is None;
+    `snapshot_error` is the reason why the last request failed. `snapshot_credentials` are sealed
+    with the key of the data directory. `snapshot_digest` is set once the host of `snapshot_url`
+    has asked for Digest. `site` is a path, or None. `image_sizes` has the declared size (width,
+    height) of the images that a source's numbers refer to, None for shares.
     """
 
     __tablename__ = "cameras"
@@ -81,14 +82,14 @@ class CameraRecord(Record):
     reference_tracks: Mapped[int]
     version: Mapped[int]
     estimate_due_at: Mapped[datetime | None]
-    looked_at_pk: Mapped[int | None]
+    read_track_pk: Mapped[int | None]
     checked_at: Mapped[datetime | None]
     full_estimate_asked: Mapped[bool] = mapped_column(default=False)
     estimate_tries: Mapped[int] = mapped_column(default=0)
     estimate_error: Mapped[str | None]
     estimate_failing_since: Mapped[datetime | None]
     estimate_after: Mapped[datetime | None]
-    lacks: Mapped[Reasons] = mapped_column(default=())
+    missing_parts: Mapped[Reasons] = mapped_column(default=())
     snapshot_url: Mapped[str | None]
     snapshot_due_at: Mapped[datetime | None]
     snapshot_error: Mapped[str | None]
@@ -105,7 +106,7 @@ class CameraRecord(Record):
 
 
 _ORIGINS = (
-    Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED, Origin.ASSUMED, Origin.AGREED
+    Origin.REGISTERED, Origin.CHANGED, Origin.ACCEPTED, Origin.ASSUMED, Origin.CONFIRMED
 )  # fmt: skip
 
 
@@ -147,7 +148,7 @@ class PriorPoseRecord(Record):
 
     @property
     def assumed(self) -> bool:
-        """True of one that nobody has said or agreed to."""
+        """True if the pose was neither given nor confirmed."""
         return self.origin == Origin.ASSUMED
 
     @property
@@ -157,10 +158,10 @@ class PriorPoseRecord(Record):
 
 
 class ProposedPoseRecord(Record):
-    """The pose that people told of a camera whose prior pose is assumed; the newest look's.
+    """The newest estimated pose of a camera whose prior pose is assumed.
 
-    `covariance` (3, 3) is of tilt, roll and log height; `identifiable` names those of the three
-    that are known well enough to be agreed to.
+    `covariance` (3, 3) is of tilt, roll and log height; `identifiable` names the
+    parameters that are certain enough to be confirmed.
     """
 
     __tablename__ = "proposed_poses"
@@ -336,7 +337,7 @@ def proposed_pose(session: Session, prior_pose_id: int) -> ProposedPoseRecord | 
 def prior_pose_at(session: Session, camera_id: str, at: datetime) -> PriorPoseRecord:
     """The pose that a camera was trusted to have at a time; its first one before all of them.
 
-    One that is assumed is there alone where nobody has ever agreed to one.
+    An assumed pose is returned only if no pose was ever given or confirmed.
     """
     query = newest_first(PriorPoseRecord, camera_id)
     trusted = query.where(PriorPoseRecord.origin != Origin.ASSUMED)
@@ -418,9 +419,9 @@ def digest_urls(session: Session) -> Sequence[str]:
 
 
 def lacking(session: Session, code: ServiceCode) -> set[str]:
-    """The cameras whose estimate lacks something, by the code of the reason."""
-    lacks = cast(CameraRecord.lacks, String)
-    return set(session.scalars(select(CameraRecord.id).where(lacks.contains(f'"{code}"'))))
+    """The ids of cameras whose estimate has a missing part with this reason code."""
+    missing_parts = cast(CameraRecord.missing_parts, String)
+    return set(session.scalars(select(CameraRecord.id).where(missing_parts.contains(f'"{code}"'))))
 
 
 class RhythmRecord(Record):

@@ -77,8 +77,8 @@ class EstimateRecord(Record):
     drift_angle_rad: Mapped[float]
     moved: Mapped[float]  # the probability that it did
     moved_parameters: Mapped[dict[str, Any]]  # and that each parameter changed
-    rivals: Mapped[list[Any]] = mapped_column(JSON)  # other poses that explain the tracks
-    would_notice: Mapped[dict[str, Any]]  # by parameter, of 60, 250, 800 people
+    alternatives: Mapped[list[Any]] = mapped_column(JSON)  # other poses that explain the tracks
+    detectable: Mapped[dict[str, Any]]  # by parameter, of 60, 250, 800 people
     suspected: Mapped[bool]  # the score test says that the camera has moved
     drift_streak: Mapped[int]  # 1: beyond the limits; -1: below the share that clears
     drifted: Mapped[list[str]]  # of those: what has been beyond since it began

@@ -49,11 +49,11 @@ _IDS = "ids"
 class Newest:
     """The newest rows of a camera, and signs of more to know.
 
-    The reference that counts comes without the site itself, and of several cameras the estimate
-    without what is behind it. `last_track_s` is when the newest track ended of those that count,
-    `usual_gap_s` and `delay_s` are of the arrival model, if there is one. `fires` says that an
-    alert does, `attended` that there are maintenance windows, `assumed` that nobody has agreed to
-    its prior pose. `images` counts those that were compared with that pose's first.
+    The active reference comes without the site itself and, for several cameras, the estimate
+    without its evidence. `last_track_s` is the end of the newest track of the active source;
+    `usual_gap_s` and `delay_s` come from the arrival model, if there is one. `fires` is true if an
+    alert is open, `attended` if there are maintenance windows, `assumed` if the prior pose was
+    never given or confirmed. `images` counts the images compared with that pose's first.
     """
 
     reference: SiteReferenceRecord

@@ -75,7 +75,7 @@ class SiteReferenceRecord(Record):
     ready_at: Mapped[datetime | None]
 
     __table_args__ = (
-        one_of("answer", (Answer.PUT_BACK, Answer.MENDED, Answer.FALSE_ALARM)),
+        one_of("answer", (Answer.PUT_BACK, Answer.FIXED, Answer.FALSE_ALARM)),
         Index(None, "camera_id", "id"),
         {"sqlite_autoincrement": True},  # an id is never given twice
     )
@@ -183,7 +183,7 @@ class AnchorRecord(Record):
     """The first flow map and drift chart of a reference: they never grow (`models.pose`).
 
     `flow` and `chart` are of tracks of which the last ended at `to_s`. `creep` is the log of whole
-    days since (`models.monitoring.creep`), up to `logged_to_s`; None as long as there is none.
+    days since (`models.monitoring.slow_drift`), up to `logged_to_s`; None as long as there is none.
     """
 
     __tablename__ = "anchors"

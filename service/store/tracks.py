@@ -38,9 +38,9 @@ from models.tracks.trajectory import Trajectory
 from service.store.cameras import CameraRecord
 from service.store.engines.dialects import new_rows
 from service.store.engines.sqlite import Prepared
-from service.store.look_budget import LookBudget, TrackSize
 from service.store.record import Record, camera_key, count_where, delete_some
 from service.store.references import CameraId, counting_source
+from service.store.run_budget import RunBudget, TrackSize
 
 
 class TrackRecord(Record):
@@ -95,7 +95,7 @@ def by_end(
     *conditions: ColumnElement[bool],
     newest_first: bool = False,
     limit: int | None = None,
-    budget: LookBudget | None = None,
+    budget: RunBudget | None = None,
 ) -> Sequence[StoredTrack]:
     """Tracks that meet some conditions in the order of their ends; or the newest first.
 
@@ -427,7 +427,7 @@ def unseen_since(session: Session) -> dict[str, tuple[int, datetime]]:
         select(func.min(TrackRecord.id))
         .where(
             TrackRecord.camera_id == CameraRecord.id,
-            TrackRecord.id > func.coalesce(CameraRecord.looked_at_pk, -1),
+            TrackRecord.id > func.coalesce(CameraRecord.read_track_pk, -1),
         )
         .correlate(CameraRecord)
         .scalar_subquery()

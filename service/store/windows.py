@@ -9,8 +9,8 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
 from service.store.engines.dialects import new_rows, whole
-from service.store.look_budget import LookBudget
 from service.store.record import Record, count_where, foreign_key
+from service.store.run_budget import RunBudget
 from service.store.tracks import (
     Spans,
     StoredTrack,
@@ -59,7 +59,7 @@ class StillBounds:
 
 
 def window(
-    session: Session, bounds: WindowBounds, budget: LookBudget | None = None
+    session: Session, bounds: WindowBounds, budget: RunBudget | None = None
 ) -> Sequence[StoredTrack]:
     """The tracks of a window in the order of their ends."""
     return by_end(session, TrackRecord.id.in_(window_ids(session, bounds)), budget=budget)
@@ -77,7 +77,7 @@ def first(
     started_from_s: float | None,
     limit: int,
     without: Spans = (),
-    budget: LookBudget | None = None,
+    budget: RunBudget | None = None,
 ) -> Sequence[StoredTrack]:
     """The first tracks by their ends that started from a time on and were not seen at others."""
     conditions = *started_from(camera_id, started_from_s), *outside(without)
@@ -85,7 +85,7 @@ def first(
 
 
 def still(
-    session: Session, bounds: StillBounds, limit: int, budget: LookBudget | None = None
+    session: Session, bounds: StillBounds, limit: int, budget: RunBudget | None = None
 ) -> Sequence[StoredTrack]:
     """The newest so many tracks of a camera at its prior pose, in the order of their ends."""
     return by_end(session, *_still(bounds), newest_first=True, limit=limit, budget=budget)[::-1]
@@ -131,7 +131,7 @@ def of_days(
     after_s: float,
     to_s: float,
     most_a_day: int,
-    budget: LookBudget | None = None,
+    budget: RunBudget | None = None,
 ) -> Sequence[StoredTrack]:
     """The tracks within bounds that ended after a time and before another, by their ends.
 
@@ -198,7 +198,7 @@ def without_prediction(
     bounds: WindowBounds,
     model_id: str,
     limit: int,
-    budget: LookBudget | None = None,
+    budget: RunBudget | None = None,
 ) -> Sequence[StoredTrack]:
     """Tracks of the window that the model has not looked at, newest first."""
     predicted = exists().where(

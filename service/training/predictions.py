@@ -15,7 +15,7 @@ from service.references import window_of
 from service.settings import Settings
 from service.store import references, tracks, trainings, windows
 from service.store.engines.store import Store
-from service.store.look_budget import LookBudget
+from service.store.run_budget import RunBudget
 from service.store.tracks import StoredTrack
 from service.store.trainings import ModelRecord, WeightsRecord
 
@@ -58,7 +58,7 @@ def load_pending(
     settings: Settings,
     camera_id: str,
     limit: int,
-    budget: LookBudget | None = None,
+    budget: RunBudget | None = None,
 ) -> PendingTracks | None:
     """Tracks of the window that the model in use has not seen; None without model or camera."""
     reference = references.newest_if_any(session, camera_id)

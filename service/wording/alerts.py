@@ -9,7 +9,7 @@ from service.enums import Activity, AlertKind, AlertSource, Answer, Outcome, Sev
 from service.store.alerts import AlertRecord
 from service.store.estimates import EstimateRecord
 from service.store.journal import ActivityRecord
-from service.wording.acts import ACTS
+from service.wording.actions import ACTIONS
 from service.wording.language import N_, _, inner
 from service.wording.moves import NAMES, offset_words
 from service.wording.reasons import in_words, percent
@@ -54,7 +54,7 @@ SEVERITIES = {Severity.CRITICAL: N_("Critical"), Severity.WARNING: N_("Warning")
 OUTCOMES = {
     Outcome.PUT_BACK: N_("put back"),
     Outcome.ACCEPTED: N_("new aim kept"),
-    Outcome.MENDED: N_("put right"),
+    Outcome.FIXED: N_("fixed"),
     Outcome.RELEARNED: N_("learned anew"),
     Outcome.FALSE_ALARM: N_("false alarm"),
     Outcome.CLEARED: N_("ended by itself"),
@@ -71,31 +71,31 @@ _ANSWERS = {
     AlertKind.DRIFT: _OF_POSE,
     AlertKind.UNSURE: _OF_POSE,
     AlertKind.CLOCK: {
-        Answer.MENDED: N_("Clock and frame rate are as they should be; the next people tell."),
+        Answer.FIXED: N_("Clock and frame rate are as they should be; the next people tell."),
         Answer.FALSE_ALARM: _NOTHING_WRONG,
     },
     AlertKind.LENS: {
-        Answer.MENDED: N_("Zoom and picture size are as they should be; the next people tell."),
+        Answer.FIXED: N_("Zoom and picture size are as they should be; the next people tell."),
         Answer.FALSE_ALARM: _NOTHING_WRONG,
     },
     AlertKind.NO_DATA: {
-        Answer.MENDED: N_("Camera or tracker was repaired. Should it go on, another alert opens."),
+        Answer.FIXED: N_("Camera or tracker was repaired. Should it go on, another alert opens."),
         Answer.FALSE_ALARM: N_("Nobody was to come: such a silence counts as usual from now on."),
     },
     AlertKind.STALE: {
-        Answer.MENDED: N_("Should it go on, another alert opens."),
+        Answer.FIXED: N_("Should it go on, another alert opens."),
         Answer.FALSE_ALARM: N_("Nothing was wrong. Should it go on, another alert opens."),
     },
     AlertKind.TRACKER: {
-        Answer.MENDED: N_("The other one is off: only one tracker posts from now on."),
+        Answer.FIXED: N_("The other one is off: only one tracker posts from now on."),
         Answer.FALSE_ALARM: N_("Both may post: the one that counts counts, without an alert."),
     },
     AlertKind.PICTURE: {
-        Answer.MENDED: N_("The view is free and sharp. Should it go on, another alert opens."),
+        Answer.FIXED: N_("The view is free and sharp. Should it go on, another alert opens."),
         Answer.FALSE_ALARM: N_("Nothing was wrong. Later pictures are compared with the next one."),
     },
     AlertKind.MANY_MOVED: {
-        Answer.MENDED: N_(
+        Answer.FIXED: N_(
             "The tracker, its clock or frame rate is as it should be. Its cameras are monitored "
             "again; cameras that turned keep their alerts."
         ),
@@ -105,7 +105,7 @@ _ANSWERS = {
         ),
     },
     AlertKind.MANY_SILENT: {
-        Answer.MENDED: N_("The tracker was repaired. Should it go on, another alert opens."),
+        Answer.FIXED: N_("The tracker was repaired. Should it go on, another alert opens."),
         Answer.FALSE_ALARM: N_("Nobody was to come before any of its cameras."),
     },
 }
@@ -113,7 +113,7 @@ _ANSWERS = {
 ANSWERED = {
     Activity.POSE_ACCEPTED: N_("kept the new aim"),
     Activity.POSE_PUT_BACK: N_("said that it was put back"),
-    Activity.POSE_MENDED: N_("said that it was put right"),
+    Activity.POSE_FIXED: N_("reported it as fixed"),
     Activity.POSE_FALSE_ALARM: N_("called it a false alarm"),
     Activity.REFERENCE_RESET: N_("had it learned anew at the old aim"),
 }
@@ -136,10 +136,10 @@ _DONE = {
     Activity.CAMERA_CHANGED: N_("{who} changed what is said of the camera"),
     Activity.CAMERA_DESCRIBED: N_("{who} changed its {fields}"),
     Activity.CAMERA_REMOVED: N_("{who} removed the camera"),
-    Activity.POSE_AGREED: N_("{who} agreed to the pose that people told"),
+    Activity.POSE_CONFIRMED: N_("{who} confirmed the proposed pose"),
     Activity.POSE_ACCEPTED: N_("{who} kept the new aim"),
     Activity.POSE_PUT_BACK: N_("{who} said that it was put back"),
-    Activity.POSE_MENDED: N_("{who} said that it was put right"),
+    Activity.POSE_FIXED: N_("{who} reported it as fixed"),
     Activity.POSE_FALSE_ALARM: N_("{who} called it a false alarm"),
     Activity.POSE_UNDONE: N_("{who} undid the last answer"),
     Activity.REFERENCE_RESET: N_("{who} had it learned anew at the old aim"),
@@ -257,9 +257,9 @@ def answers(kind: AlertKind) -> list[AnswerWords]:
     return [
         AnswerWords(
             outcome=answer,
-            label=_(ACTS[answer].one),
+            label=_(ACTIONS[answer].one),
             consequence=_(comes_to),
-            done=_(ACTS[answer].done),
+            done=_(ACTIONS[answer].done),
         )
         for answer, comes_to in _ANSWERS[kind].items()
     ]
@@ -340,7 +340,7 @@ def alert_summary(
     return f"{kind.replace('_', ' ')}: {whose}"
 
 
-def is_act(entry: ActivityRecord) -> bool:
+def is_action(entry: ActivityRecord) -> bool:
     """True of what a person did to cameras and alerts."""
     return entry.what in _DONE and not _by_itself(entry)
 

@@ -3,6 +3,7 @@
 import re
 import reprlib
 from collections.abc import Iterable
+from datetime import date
 from typing import Any
 
 from pydantic_core import ErrorDetails
@@ -60,6 +61,7 @@ _HIDDEN = "***"
 _FOLLOWS = "default_factory_not_called"  # from the error of another field
 _GOT = re.compile(r"\bgot\b")
 _NAMED = re.compile(r"([a-z][a-z0-9_]*): (.*)", re.DOTALL)
+_LIMITS = frozenset(("gt", "ge", "lt", "le"))  # numbers or dates
 _MOST_CHARACTERS = 80
 _BRIEF = reprlib.Repr()
 _BRIEF.maxstring = _MOST_CHARACTERS
@@ -73,6 +75,8 @@ def field_errors(items: Iterable[ErrorDetails]) -> tuple[FieldError, ...]:
 def _field_error(item: ErrorDetails) -> FieldError:
     pointer = "".join(f"/{part}" for part in item["loc"] if part != "body")
     context: dict[str, Any] = dict(item.get("ctx", {}))
+    for name in _LIMITS & context.keys():
+        context[name] = _brief(context[name])
     got = _HIDDEN if any(part in _SECRET for part in item["loc"]) else item.get("input")
     if item["type"] in _REASONS:
         words = _REASONS[item["type"]]
@@ -97,4 +101,6 @@ def _limit(value: object) -> str:
 def _brief(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.10g}"
+    if isinstance(value, date):
+        return value.isoformat()
     return f"{_BRIEF.repr(value):.{_MOST_CHARACTERS}}"

@@ -104,8 +104,8 @@ def _status_words(camera: CameraFacts, clock: Clock) -> str:
         return _("Nobody has posted anybody's track for this camera yet.")
     if state == PoseState.UNCALIBRATED:
         return _(
-            "Nobody has said how high it hangs and where it looks. The people before it tell: see "
-            "below, and agree once it looks right."
+            "The pose is not calibrated. It is estimated from the first tracks: see below, and "
+            "confirm it if it looks right."
         )
     if state == PoseState.LEARNING or estimate is None or not camera.judged:
         return _waiting(camera)
@@ -237,7 +237,7 @@ def fleet_line(
     if asked:
         return _("a question about its tracks is open: its page asks it")
     if state == PoseState.UNCALIBRATED:
-        return _("its pose is found by the people before it: its page has it, to be agreed to")
+        return _("its pose is estimated from the first tracks; confirm it on its page")
     if state == PoseState.LEARNING and learned is not None:
         return _("learning what is usual: {n} of {wanted} people", n=learned, wanted=wanted)
     if state == PoseState.LEARNING:
@@ -260,12 +260,12 @@ def fleet_line(
 
 
 def page_flags(
-    lacks: Sequence[Reason], attended_until: datetime | None, clock: Clock
+    missing_parts: Sequence[Reason], attended_until: datetime | None, clock: Clock
 ) -> Sequence[str]:
     """Flags of a camera's page, beside those of its alerts."""
     found = [
         _("Without the {part}", part=str(lack.values["part"]).replace("_", " "))
-        for lack in lacks
+        for lack in missing_parts
         if lack.code == ServiceCode.WITHOUT_PART
     ]
     if attended_until is not None:

@@ -57,7 +57,7 @@ def skipped_words(reason: SkipReason, count: int) -> str:
     return _(one if count == 1 else many, n=count)
 
 
-def mends_words(code: str) -> str:
+def fix_words(code: str) -> str:
     """What mends a refusal; empty where its own words say all."""
     return _(_MENDS.get(code, ""))
 

@@ -3,8 +3,8 @@
 Labels of states and actions come from where they are defined, so both are always the same.
 """
 
-from service.enums import Act, AlertKind, Answer, PoseState
-from service.wording.acts import ACTS
+from service.enums import Action, AlertKind, Answer, PoseState
+from service.wording.actions import ACTIONS
 from service.wording.camera import STATES
 from service.wording.language import N_
 
@@ -87,13 +87,13 @@ WORDS = {
         ),
     },
     N_("Actions"): {
-        ACTS[Answer.PUT_BACK].one: ACTS[Answer.PUT_BACK].means,
-        ACTS[Answer.ACCEPTED].one: ACTS[Answer.ACCEPTED].means,
-        ACTS[Answer.MENDED].one: ACTS[Answer.MENDED].means,
-        ACTS[Act.ACKNOWLEDGE].one: ACTS[Act.ACKNOWLEDGE].means,
-        N_("Silence"): ACTS[Act.SILENCE].means,
-        N_("Maintenance"): ACTS[Act.MAINTENANCE].means,
-        ACTS[Act.RESET].one: ACTS[Act.RESET].means,
-        N_("Site and tags"): ACTS[Act.TAG].means,
+        ACTIONS[Answer.PUT_BACK].one: ACTIONS[Answer.PUT_BACK].means,
+        ACTIONS[Answer.ACCEPTED].one: ACTIONS[Answer.ACCEPTED].means,
+        ACTIONS[Answer.FIXED].one: ACTIONS[Answer.FIXED].means,
+        ACTIONS[Action.ACKNOWLEDGE].one: ACTIONS[Action.ACKNOWLEDGE].means,
+        N_("Silence"): ACTIONS[Action.SILENCE].means,
+        N_("Maintenance"): ACTIONS[Action.MAINTENANCE].means,
+        ACTIONS[Action.RESET].one: ACTIONS[Action.RESET].means,
+        N_("Site and tags"): ACTIONS[Action.TAG].means,
     },
 }

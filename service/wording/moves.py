@@ -58,7 +58,7 @@ def parameter_rows(
 
 def deaf_words(estimate: EstimateRecord | None) -> str:
     """What no number of people would tell of a camera, and what would help; empty where nothing."""
-    notice = {} if estimate is None else estimate.would_notice
+    notice = {} if estimate is None else estimate.detectable
     if not notice or notice["heading_rad"] is not None:
         return ""
     return _(
@@ -217,7 +217,7 @@ def _height_words(estimate: EstimateRecord) -> str:
 
 def _least_told(estimate: EstimateRecord, name: str) -> float | None:
     """The smallest move of a number that `TOLD_BY` people would tell, as it is shown."""
-    notice = estimate.would_notice
+    notice = estimate.detectable
     smallest = notice.get(FIELDS[name])
     if smallest is None:
         return None

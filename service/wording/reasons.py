@@ -20,7 +20,7 @@ _SINCE = {
     Cause.REFERENCE: N_("since the reference"),
     Cause.MAINTENANCE: N_("since the maintenance"),
     Cause.PUT_BACK: N_("since the camera was put back"),
-    Cause.MENDED: N_("since the clock was mended"),
+    Cause.FIXED: N_("since the clock was fixed"),
     Cause.FALSE_ALARM: N_("since the alert was called a false alarm"),
 }
 _NUMBERS = {
@@ -139,11 +139,12 @@ def _chart(v: _Values) -> str:
     )
 
 
-def _crept(v: _Values) -> str:
+def _slow_drift(v: _Values) -> str:
     said = {"number": _number(v), "since": datetime.fromisoformat(v["since"]).astimezone(v["zone"])}
     return _(
-        "has crept by {by_deg:+.1f} deg (sd {sd_deg:.1f}) in {number} since {since:%Y-%m-%d}, by "
-        "the first map and speeds of its reference (creep: {statistic:.0f}, alarm at {level:.0f})",
+        "has drifted slowly by {by_deg:+.1f} deg (sd {sd_deg:.1f}) in {number} since "
+        "{since:%Y-%m-%d}, relative to the first map and speeds of its reference "
+        "(score {statistic:.0f}, alarm at {level:.0f})",
         **{**v, **said},
     )
 
@@ -311,7 +312,7 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
     ),
     TracksCode.WITHIN_LIMITS: _numbers,
     TracksCode.CHART: _chart,
-    TracksCode.CREPT: _crept,
+    TracksCode.SLOW_DRIFT: _slow_drift,
     TracksCode.SCALE_CHANGED: _scale_changed,
     TracksCode.LENS_CHANGED: _lens_changed,
     TracksCode.PATHS_CHANGED: N_(
@@ -361,7 +362,7 @@ _WORDS: dict[StrEnum, str | Callable[[_Values], str]] = {
         **v,
     ),
     ServiceCode.POSE_PROPOSED: lambda v: _(
-        "{tracks} tracks tell its pose ({sure}); somebody has to agree to it",
+        "pose estimated from {tracks} tracks ({sure}); an operator has to confirm it",
         sure=_sure_of_pose(v),
         **v,
     ),

@@ -10,13 +10,13 @@ from models.errors import CheckpointError
 from models.tracks.image_size import doubt_image_size
 from service.enums import RunKind
 from service.estimate_queue import (
-    begin_look,
     budget_of,
-    end_look,
-    fail_look,
+    fail_run,
+    finish_run,
     leave_poisoned,
     note_partial_failures,
     skipped_by,
+    start_run,
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
 from service.estimation.compute import ComputedEstimate, compute_estimate
@@ -35,7 +35,7 @@ from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
 from service.estimation.seen_picture import ask_in_doubt
 from service.store.estimates import EstimateRecord
-from service.store.look_budget import LookBudget
+from service.store.run_budget import RunBudget
 from service.store.runs import RunTotal
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
 from service.workers.context import JobContext
@@ -57,14 +57,14 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
             return
         # The mark "due" goes first: tracks that arrive from then on ask for a look of their own.
-        newest_pk, asked = begin_look(session, camera_id)
+        newest_pk, asked = start_run(session, camera_id)
         budget = budget_of(session, camera_id)
     try:
         with limited_effort(context.settings.estimate_cpu_s):
             kind = _look(context, camera_id, newest_pk, budget, asked=asked)
     except Exception as error:
         with context.store.write(camera_id) as session:
-            fail_look(session, camera_id, repr(error))
+            fail_run(session, camera_id, repr(error))
         raise
     finally:
         context.runs.add(kind, RunTotal(runs=1, cpu_s=time.thread_time() - begun_s))
@@ -74,7 +74,7 @@ def _look(
     context: JobContext,
     camera_id: str,
     newest_pk: int | None,
-    budget: LookBudget,
+    budget: RunBudget,
     *,
     asked: bool,
 ) -> RunKind:
@@ -90,7 +90,7 @@ def _look(
     if propose_if_uncalibrated(context, camera_id, unpacked):
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
+            finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
         return RunKind.FULL
     failures.unless_failed("picture", partial(compare_if_due, context, camera_id))
     missing = predict_pending(context, camera_id, unpacked)
@@ -99,9 +99,9 @@ def _look(
     if not learn_if_due(context, camera_id, unpacked):
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-            end_look(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
+            finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
         return RunKind.FULL
-    failures.unless_failed("anchor", partial(log_creep_if_due, context, camera_id, unpacked))
+    failures.unless_failed("anchor", partial(log_slow_drift_if_due, context, camera_id, unpacked))
     with store.read() as session:
         evidence = load_evidence(session, settings, camera_id, unpacked, asked=asked)
     if skipped := skipped_by(budget):
@@ -118,7 +118,7 @@ def _look(
             _log_estimate(save_by_picture(session, settings, camera_id))
         cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        end_look(
+        finish_run(
             session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
         )
     if isinstance(found, Monitored):
@@ -224,7 +224,7 @@ def learn_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> boo
     return True
 
 
-def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
+def log_slow_drift_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:
     """Hold the whole days that have come since the last time against a camera's anchor."""
     with context.store.read() as session:
         days = load_anchor_days(session, context.settings, camera_id, unpacked)
@@ -234,7 +234,7 @@ def log_creep_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) ->
     with context.store.write(camera_id) as session:
         save_anchor_days(session, days, logged)
     fields = {"camera_id": camera_id, "tracks": len(days.trajectories)}
-    log.info("creep_logged", extra=fields)
+    log.info("slow_drift_logged", extra=fields)
 
 
 def grow_if_due(context: JobContext, camera_id: str, unpacked: Unpacked) -> None:

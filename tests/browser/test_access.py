@@ -125,8 +125,8 @@ def test_who_may_only_look_is_offered_no_acts(closed, browser):
         page.goto("/ui/cameras/corner")
         page.locator("#more > summary").click()
         page.get_by_role("heading", name="What can be done").wait_for()
-        buttons = page.locator("[data-act]:visible").evaluate_all(
-            "all => all.map(b => b.dataset.act)"
+        buttons = page.locator("[data-action]:visible").evaluate_all(
+            "all => all.map(b => b.dataset.action)"
         )
         offered[scope] = set(buttons)
         if scope == "read":

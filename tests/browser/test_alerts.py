@@ -61,12 +61,12 @@ def test_twelve_cameras_take_three_clicks_and_it_stays_live(page, server):
     expect(page.locator("#bulk")).to_be_hidden()
     expect(page.locator("#undo")).to_contain_text("Put back: 12 cameras.")
     shoot(page, "alerts-undo-phone")
-    page.get_by_role("button", name="It was put right").click()
+    page.get_by_role("button", name="Fixed", exact=True).click()
     expect(page.locator("#rows")).to_contain_text("No alert is like that")
     found = server.http.get("/alerts").json()["items"]
     assert {(a["outcome"], a["resolved_by"]) for a in found} == {
         ("put_back", "Ada"),
-        ("mended", "Ada"),
+        ("fixed", "Ada"),
     }
     fleet.close()
 
@@ -181,7 +181,7 @@ def test_a_trackers_group_is_answered_once_for_all_and_undone(page, server):
     page.evaluate("localStorage.setItem('surefoot.by', 'Ada')")
     banner = page.get_by_role("group", name="Alert about a tracker")
     expect(banner.get_by_role("button")).to_have_text(
-        ["It was put right", "False alarm", "Acknowledge", "Silence…"]
+        ["Fixed", "False alarm", "Acknowledge", "Silence…"]
     )
     expect(page.locator("#due")).to_have_text("1 needs a person, 3 cameras of nvr-east as one")
     page.get_by_label("Choose all that are found").check()
@@ -209,9 +209,9 @@ def test_a_trackers_group_is_answered_once_for_all_and_undone(page, server):
     expect(rows.locator(".badge")).to_have_text(["Many moved", "Moved", "Moved", "Moved"])
     assert axe(page) == []
     shoot(page, "group-alerts")
-    page.get_by_role("button", name="It was put right").click()
+    page.get_by_role("button", name="Fixed", exact=True).click()
     undo = page.locator("#undo")
-    expect(undo).to_contain_text("Put right: 3 cameras of nvr-east.")
+    expect(undo).to_contain_text("Fixed: 3 cameras of nvr-east.")
     expect(rows).to_have_count(0)
     undo.get_by_role("button", name="Undo").click()
     expect(page.locator("#announce")).to_have_text("Undone: 3 cameras.")

@@ -335,7 +335,7 @@ def test_many_are_answered_at_once_said_how_many_and_undone(page, fleet, server)
     for n in range(2):
         page.get_by_label(f"Choose Clock {n}").check()
     expect(put_back).to_be_hidden()
-    expect(page.get_by_role("button", name="They were put right")).to_be_visible()
+    expect(page.get_by_role("button", name="Fixed", exact=True)).to_be_visible()
     expect(mixed).to_have_text("")
     page.get_by_label("Choose all that are found").check()
     expect(put_back).to_be_hidden()
@@ -355,8 +355,8 @@ def test_many_are_answered_at_once_said_how_many_and_undone(page, fleet, server)
         for a in server.http.get("/alerts").json()["items"]
         if a["camera_id"] in ("c0", "c1")
     ]
-    body = {"ids": ids, "act": "resolve", "outcome": "false_alarm", "by": "Bo"}
-    server.http.post("/acts", json=body).raise_for_status()
+    body = {"ids": ids, "action": "resolve", "outcome": "false_alarm", "by": "Bo"}
+    server.http.post("/actions", json=body).raise_for_status()
     put_back.click()
     expect(undo).to_contain_text("Put back: 4 of 6 cameras; 2 were answered meanwhile.")
     page.unroute("**/ui/fleet/**")

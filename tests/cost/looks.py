@@ -90,7 +90,7 @@ class Looker:
         cpu_s, peak_mb = time.process_time() - before_s, _peak_mb() - before_mb
         with self._context.store.write(camera_id) as session:
             camera = session.get_one(CameraRecord, camera_id)
-            skipped = [lack.values for lack in camera.lacks if "track_ids" in lack.values]
+            skipped = [lack.values for lack in camera.missing_parts if "track_ids" in lack.values]
             session.delete(camera)
         return Cost(
             crowds=tuple(crowds),

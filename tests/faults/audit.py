@@ -19,7 +19,7 @@ _JOBS = "jobs of the engine"
 _WAITING = {
     "cameras with tracks that nothing looked at": (
         "SELECT c.id FROM cameras c WHERE (SELECT max(t.id) FROM tracks t WHERE t.camera_id = c.id)"
-        " > coalesce(c.looked_at_pk, 0)"
+        " > coalesce(c.read_track_pk, 0)"
     ),
     "trainings queued or running": (
         "SELECT camera_id || ' ' || state || ' ' || step FROM trainings"

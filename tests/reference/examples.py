@@ -243,7 +243,7 @@ def _alerts(run: _Run) -> None:
     run.schemas["Report"] = run.settled(report)
     file = run.http.get("/alerts", params={"format": "csv", "limit": 1}).text
     run.keep("GET", "/alerts", "text/csv", file)
-    run.ask("POST", "/acts", {"ids": [found["id"]], "act": "acknowledge", "by": "Ada"})
+    run.ask("POST", "/actions", {"ids": [found["id"]], "action": "acknowledge", "by": "Ada"})
     given = {"outcome": "put_back", "note": "a ladder had leant on it", "by": "Ada"}
     run.ask("POST", "/alerts/{alert_id}/resolve", given, **one)
 
@@ -285,7 +285,7 @@ def _acts(run: _Run) -> None:
     run.ask("POST", "/cameras/{camera_id}/sources/{source}/use", use, **one, source="bytetrack-1.2")
     run.ask("POST", "/cameras/{camera_id}/reference/reset", said, **one)
     _accept(run, said)
-    _agree(run, said)
+    _confirm(run, said)
     window = {"to": (run.begun + timedelta(hours=2)).isoformat(), "reason": "a lens", "by": "Ada"}
     made = run.ask("POST", "/cameras/{camera_id}/maintenance", window, **one)
     run.ask("GET", "/cameras/{camera_id}/maintenance", **one)
@@ -312,7 +312,7 @@ def _accept(run: _Run, said: Any) -> None:
     bench.queue.close()
 
 
-def _agree(run: _Run, said: Any) -> None:
+def _confirm(run: _Run, said: Any) -> None:
     """A camera without a prior pose, whose people have told one."""
     bare = {name: value for name, value in CAMERA.items() if name != "prior_pose"}
     run.http.post("/cameras", json=bare | {"id": "gate"}).raise_for_status()
@@ -333,7 +333,7 @@ def _agree(run: _Run, said: Any) -> None:
     kerb = {"kind": "length", "points": [[300, 560], [900, 575]], "length_m": 6.0}
     run.ask("PUT", "/cameras/{camera_id}/hints", [door, kerb], camera_id="gate")
     run.ask("GET", "/cameras/{camera_id}/hints", camera_id="gate")
-    run.ask("POST", "/cameras/{camera_id}/pose/agree", said, camera_id="gate")
+    run.ask("POST", "/cameras/{camera_id}/pose/confirm", said, camera_id="gate")
 
 
 def _others(run: _Run) -> None:

@@ -59,7 +59,8 @@ def _paths(document: Document) -> list[str]:
 
 
 def _operation(path: str, method: str, operation: Document) -> str:
-    lines = [f"### {method} {path}\n", f"{operation.get('description', '')}\n"]
+    lines = [f"### {method} {path}\n", f"{operation['summary']}.\n"]
+    lines += [f"{operation['description']}\n"] if operation.get("description") else []
     scopes = [scope for each in operation.get("security", []) for scope in each["token"]]
     lines.append(f"Scope: {f'`{scopes[0]}`' if scopes else 'none'}.")
     lines += [_body(operation["requestBody"])] if "requestBody" in operation else []

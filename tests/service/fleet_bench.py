@@ -163,7 +163,7 @@ class Fleet:
                 drift_roll_rad=noise(0, 0.0003), drift_heading_rad=pan * share + noise(0, 0.0003),
                 drift_angle_rad=angle * share, suspected=False,
                 moved=MOVED.get(state, 0.03) if share else 0.03, moved_parameters={},
-                rivals=[], would_notice={},
+                alternatives=[], detectable={},
                 drift_streak=5 if share and state not in STILL else 0,
                 drifted=["tilt"] if share and state not in STILL else [],
                 drift_after=None, drift_since=None, raw={},

@@ -23,7 +23,7 @@ from models.walking.reference_learning import learn_speed_reference
 from models.walking.speed_reference import SpeedReference
 from service.alerts.staleness import StaleWatch
 from service.app import create_app
-from service.estimate_queue import begin_look, end_look
+from service.estimate_queue import finish_run, start_run
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
 from service.estimation.learning import load_reference_period, save_reference
@@ -130,10 +130,10 @@ class Life:
             assert trainings.newest_model(session, camera_id) is None
         run_estimate(self.context, camera_id)
 
-    def begin_look(self, camera_id: str) -> Look:
+    def start_run(self, camera_id: str) -> Look:
         """The job up to where it has read what it needs; a reference is learned on the way."""
         with self.store.write() as session:
-            newest_pk, _ = begin_look(session, camera_id)
+            newest_pk, _ = start_run(session, camera_id)
             period = load_reference_period(session, self.settings, camera_id)
             if period is not None and period.trajectories:
                 learned = CameraSite(intrinsics=LENS, prior=PRIOR, speed_reference=some_site())
@@ -147,7 +147,7 @@ class Life:
             evidence = load_evidence(session, self.settings, camera_id)
         return Look(camera_id=camera_id, evidence=evidence, newest_pk=newest_pk)
 
-    def end_look(self, look: Look, unidentifiable: tuple[str, ...]) -> bool:
+    def finish_run(self, look: Look, unidentifiable: tuple[str, ...]) -> bool:
         """The job from there on, its numbers made up; says whether an estimate was stored."""
         record = None
         with self.store.write() as session:
@@ -155,7 +155,7 @@ class Life:
                 pose, change = self._seen(session, look.evidence)
                 finding = made_up(look.evidence, pose, unidentifiable=unidentifiable, change=change)
                 record = save_estimate(session, self.queue, self.settings, look.evidence, finding)
-            end_look(session, look.camera_id, look.newest_pk)
+            finish_run(session, look.camera_id, look.newest_pk)
         return record is not None
 
     def _seen(self, session: Any, evidence: Evidence) -> tuple[CameraPose, int | None]:

@@ -8,13 +8,13 @@ from hypothesis.stateful import (
     rule,
 )
 
-from service.enums import Act, Answer
+from service.enums import Action, Answer
 from service.store.alerts import POSE_KINDS, answers_of
 from tests.service.life import WANTED, still
 from tests.service.life_events import LifeEvents, has_camera, names, notes, said, some
 
 
-class LifeActs(LifeEvents):
+class LifeActions(LifeEvents):
     """Cameras, and those who look after them."""
 
     @has_camera
@@ -80,18 +80,21 @@ class LifeActs(LifeEvents):
                 open_ = {a["kind"] for a in self.firing() if a["camera_id"] == camera_id}
                 assert not open_ & set(POSE_KINDS), "the pose was answered for, and alerts fire on"
 
-    @rule(act=st.sampled_from([Act.PUT_BACK, Act.RESET, Act.UNDO, Act.ACCEPT]), by=names)
-    def do_with_all(self, act: Act, by: str | None) -> None:
+    @rule(
+        action=st.sampled_from([Action.PUT_BACK, Action.RESET, Action.UNDO, Action.ACCEPT]),
+        by=names,
+    )
+    def do_with_all(self, action: Action, by: str | None) -> None:
         """One act with every camera at once; what one refuses stops no other."""
         ids = sorted(self.life.stands)
         if not ids:
             return
-        body = said(ids=ids, act=act, by=by)
-        for item in self.call("POST", "/acts", json=body).json()["items"]:
+        body = said(ids=ids, action=action, by=by)
+        for item in self.call("POST", "/actions", json=body).json()["items"]:
             if item["problem"] is not None:
                 assert item["problem"]["status"] == 409
-                assert act in (Act.UNDO, Act.ACCEPT)
-            elif act == Act.UNDO:
+                assert action in (Action.UNDO, Action.ACCEPT)
+            elif action == Action.UNDO:
                 self.answered.discard(item["id"])
             else:
                 self.answered.add(item["id"])

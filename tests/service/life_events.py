@@ -166,7 +166,7 @@ class LifeEvents(RuleBasedStateMachine):
         if camera_id == STREET:
             self.life.really_look(camera_id)
             self.answered.discard(camera_id)  # it may have stored one, or not
-        elif self.life.end_look(self.life.begin_look(camera_id), unidentifiable):
+        elif self.life.finish_run(self.life.start_run(camera_id), unidentifiable):
             self.answered.discard(camera_id)
 
     @has_camera
@@ -174,13 +174,13 @@ class LifeEvents(RuleBasedStateMachine):
     def begin_a_look(self, n: int) -> None:
         camera_id = self.camera(n)
         if camera_id != STREET:
-            self.looks.append(self.life.begin_look(camera_id))
+            self.looks.append(self.life.start_run(camera_id))
 
     @precondition(lambda self: self.looks)
     @rule(unidentifiable=UNIDENTIFIABLE)
     def end_a_look(self, unidentifiable: tuple[str, ...]) -> None:
         look = self.looks.pop(0)
-        if look.camera_id in self.life.stands and self.life.end_look(look, unidentifiable):
+        if look.camera_id in self.life.stands and self.life.finish_run(look, unidentifiable):
             self.answered.discard(look.camera_id)
 
     @has_camera

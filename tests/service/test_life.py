@@ -19,7 +19,7 @@ from hypothesis.stateful import (
 from prometheus_client.parser import text_string_to_metric_families as families
 
 from service.store.alerts import POSE_KINDS, AlertRecord
-from tests.service.life_activity import LifeActs
+from tests.service.life_activity import LifeActions
 from tests.service.life_events import (
     NUMBERS,
 )
@@ -27,7 +27,7 @@ from tests.service.life_events import (
 STEPS = int(os.environ.get("SUREFOOT_TEST_LIFE_STEPS", "0"))
 
 
-class LifeOfCameras(LifeActs):
+class LifeOfCameras(LifeActions):
     """What holds after every activity."""
 
     @invariant()

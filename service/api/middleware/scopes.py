@@ -66,7 +66,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "POST /ui/logout",
     ),
     TokenScope.OPERATE: (
-        "POST /acts",
+        "POST /actions",
         "POST /alerts/{alert_id}/acknowledge",
         "POST /alerts/{alert_id}/resolve",
         "POST /alerts/{alert_id}/silence",
@@ -74,7 +74,7 @@ _ROUTES: dict[Need, tuple[str, ...]] = {
         "PATCH /cameras/{camera_id}/maintenance/{window_id}",
         "DELETE /cameras/{camera_id}/maintenance/{window_id}",
         "POST /cameras/{camera_id}/pose/accept",
-        "POST /cameras/{camera_id}/pose/agree",
+        "POST /cameras/{camera_id}/pose/confirm",
         "POST /cameras/{camera_id}/pose/put-back",
         "POST /cameras/{camera_id}/pose/undo",
         "POST /cameras/{camera_id}/reference/reset",

@@ -1,8 +1,8 @@
 // All alerts: answered in their lines, or many at once; what happens is fetched anew.
 
 import { announce, guarded } from "./act.js";
-import { ALERT_ACTS, listen } from "./alert_acts.js";
-import { answer, offer as offerFor, undoneHere, withMany } from "./bulk_acts.js";
+import { ALERT_ACTIONS, listen } from "./alert_actions.js";
+import { answer, offer as offerFor, undoneHere, withMany } from "./bulk_actions.js";
 import { gathered, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
 import { _ } from "./words.js";
@@ -68,7 +68,7 @@ list.addEventListener("change", (event) => {
   }
   offer();
 });
-listen(list, { ...ALERT_ACTS, answer: (said, button) => answer({ ...said, name: itemOf(button.closest("li")).name }) });
+listen(list, { ...ALERT_ACTIONS, answer: (said, button) => answer({ ...said, name: itemOf(button.closest("li")).name }) });
 const again = () => refresh().catch(console.warn);
 document.addEventListener("acted", again);
 subscribe(

@@ -1,7 +1,7 @@
 // The page of a camera: what happens is fetched and exchanged part by part; actions are calls.
 
 import { announce, call, confirmed, guarded } from "./act.js";
-import { ALERT_ACTS, done, listen, planMaintenance } from "./alert_acts.js";
+import { ALERT_ACTIONS, done, listen, planMaintenance } from "./alert_actions.js";
 import { myName, nameMe, signed } from "./dialogs.js";
 import { debounced, subscribe } from "./events.js";
 import { keepTimes } from "./times.js";
@@ -80,24 +80,24 @@ const put = (words, method, url, body) => done(words, signed(method, url, body))
 
 document.addEventListener("acted", () => refresh().catch(() => {}));
 
-const ACTS = {
-  ...ALERT_ACTS,
+const ACTIONS = {
+  ...ALERT_ACTIONS,
   accept: () => put(_("New aim kept."), "POST", `${path}/pose/accept`),
   "put-back": () => put(_("Put back."), "POST", `${path}/pose/put-back`),
   relearn: () => put(_("Being learned anew."), "POST", `${path}/reference/reset`),
   undo: () => put(_("Undone."), "POST", `${path}/pose/undo`),
 
-  async agree() {
+  async confirm() {
     const yes = await confirmed({
       title: _("Does it look right?"),
       detail: _(
-        "The pose that people told becomes the prior pose, as sure as it is. Look whether the " +
-          "horizon and the grid lie on the ground; a still image behind them helps. Moves are told " +
-          "against it from then on.",
+        "The proposed pose becomes the prior pose, with its uncertainty. Check that the horizon and " +
+          "the grid match the scene; a still image behind them helps. From then on, moves are measured " +
+          "relative to this pose.",
       ),
-      yes: _("Agree to it"),
+      yes: _("Confirm"),
     });
-    if (yes && (await signed("POST", `${path}/pose/agree`)) !== undefined) location.reload();
+    if (yes && (await signed("POST", `${path}/pose/confirm`)) !== undefined) location.reload();
   },
 
   async "use-source"({ source }) {
@@ -152,15 +152,15 @@ const ACTS = {
   },
 };
 
-listen(root, ACTS);
+listen(root, ACTIONS);
 
 root.addEventListener("change", (event) => {
-  const file = event.target.dataset.act === "still" && event.target.files[0];
+  const file = event.target.dataset.action === "still" && event.target.files[0];
   if (file) guarded(event.target, () => sendStill(file));
 });
 
 root.addEventListener("input", ({ target }) => {
-  if (target.dataset.act !== "compare") return;
+  if (target.dataset.action !== "compare") return;
   target.closest("figure").style.setProperty("--shown", `${target.value}%`);
 });
 

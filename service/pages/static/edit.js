@@ -2,7 +2,7 @@
 // was read as they opened.
 
 import { Refused, call } from "./act.js";
-import { done, listen } from "./alert_acts.js";
+import { done, listen } from "./alert_actions.js";
 import { ask, myName, nameMe, wordsIn } from "./dialogs.js";
 import { _ } from "./words.js";
 

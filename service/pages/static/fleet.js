@@ -2,8 +2,8 @@
 // which are fetched; rows that something happened to are fetched anew.
 
 import { announce, call, guarded } from "./act.js";
-import { ALERT_ACTS, done, listen } from "./alert_acts.js";
-import { answer, offer, undoneHere, withMany } from "./bulk_acts.js";
+import { ALERT_ACTIONS, done, listen } from "./alert_actions.js";
+import { answer, offer, undoneHere, withMany } from "./bulk_actions.js";
 import { signed } from "./dialogs.js";
 import { gathered, subscribe } from "./events.js";
 import { placed, showPlaces, within } from "./places.js";
@@ -216,7 +216,7 @@ subscribe((event) => (event.type === "alert" ? soon(event) : later(event)));
 setInterval(() => document.hidden || Promise.all([fetchAll(), fetchBanners()]).catch(console.warn), ALL_AGAIN_MS);
 keepTimes(list, document.getElementById("banners"));
 listen(document.getElementById("banners"), {
-  ...ALERT_ACTS,
+  ...ALERT_ACTIONS,
   answer: (said, button) => answer({ ...said, name: button.closest(".banner").dataset.name }),
   async "take-over"({ handover }) {
     await done(_("Taken over."), signed("POST", `/handovers/${handover}/take`));

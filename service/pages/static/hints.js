@@ -53,7 +53,7 @@ function row(mark, number) {
   const item = document.createElement("li");
   const words = document.createElement("span");
   const size = mark.length_m ? ` ${_("of {m} m", { m: mark.length_m.toLocaleString(language) })}` : "";
-  const lies = mark.off_sd > LIES ? `: ${_("it does not fit the others")}` : "";
+  const lies = mark.residual_sd > LIES ? `: ${_("it does not fit the others")}` : "";
   words.textContent = `${NAMES[mark.kind]} ${label(number)}`.trim() + size + lies;
   const button = document.createElement("button");
   button.type = "button";
@@ -72,7 +72,7 @@ function told(answer) {
   show();
 }
 
-const bare = ({ off_sd, ...mark }) => Object.fromEntries(Object.entries(mark).filter(([, value]) => value !== null));
+const bare = ({ residual_sd, ...mark }) => Object.fromEntries(Object.entries(mark).filter(([, value]) => value !== null));
 
 async function keep(marks) {
   told(await call("PUT", url, marks.map(bare)));

@@ -1,7 +1,7 @@
 // Webhooks: tested, switched off and on, given a secret, removed, added; the page then loads anew.
 
 import { call, confirmed } from "./act.js";
-import { listen } from "./alert_acts.js";
+import { listen } from "./alert_actions.js";
 import { showErrors } from "./dialogs.js";
 import { _ } from "./words.js";
 

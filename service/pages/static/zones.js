@@ -24,7 +24,7 @@ let fresh = false; // the chosen one is new: a tap adds its next corner
 let held = -1; // the corner that is dragged
 let changed = false;
 
-const button = () => box.querySelector('[data-act="draw-zones"]');
+const button = () => box.querySelector('[data-action="draw-zones"]');
 const least = (zone) => (zone.line ? 2 : 3);
 const index = (element) => Number(element.dataset.corner ?? -1);
 
@@ -237,8 +237,8 @@ drags(over, press, (at) => put(held, at));
 box.addEventListener("keydown", key);
 box.addEventListener("click", ({ target }) => {
   const pressed = target.closest("button");
-  const { act, new: kind, zoning } = pressed?.dataset ?? {};
-  if (act === "draw-zones") guarded(pressed, () => enter(pressed));
+  const { action, new: kind, zoning } = pressed?.dataset ?? {};
+  if (action === "draw-zones") guarded(pressed, () => enter(pressed));
   else if (kind) begin(kind);
   else if (zoning === "remove") remove();
   else if (zoning === "leave") leave();

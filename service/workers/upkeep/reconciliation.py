@@ -104,7 +104,7 @@ def _is_behind(session: Session, settings: Settings, camera: CameraRecord) -> bo
     newest_pk = tracks.newest_pk(session, camera.id)
     if newest_pk is None:
         return False
-    if camera.looked_at_pk is None or camera.looked_at_pk < newest_pk:
+    if camera.read_track_pk is None or camera.read_track_pk < newest_pk:
         return True
     model = trainings.newest_model(session, camera.id)
     if model is None:

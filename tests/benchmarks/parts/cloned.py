@@ -40,7 +40,7 @@ _TABLES = (
     "camera_rhythms",
     "estimates",
 )
-_TRACK_IDS = ("looked_at_pk", "newest_track_pk")  # they name tracks without a foreign key
+_TRACK_IDS = ("read_track_pk", "newest_track_pk")  # they name tracks without a foreign key
 
 
 def people(site: int, count: int, pose: CameraPose = PRIOR) -> list[Trajectory]:

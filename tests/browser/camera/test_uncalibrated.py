@@ -58,8 +58,8 @@ def test_a_lens_is_registered_people_tell_the_pose_and_somebody_agrees(server, e
     assert axe(page) == []
     assert not too_wide(page)
     shoot(page, "uncalibrated")
-    page.get_by_role("button", name="agree to it").click()
-    page.get_by_role("button", name="Agree to it", exact=True).click()
+    page.get_by_role("button", name="Confirm this pose").click()
+    page.get_by_role("button", name="Confirm", exact=True).click()
     page.fill("#name-field", "Ada")
     page.get_by_role("button", name="Go on").click()
     expect(page.locator("section[data-state]")).to_have_attribute("data-state", "learning")
@@ -107,7 +107,7 @@ def test_a_vertical_is_drawn_by_mouse_and_makes_the_height_surer(waiting, server
     expect(row).to_contain_text("Vertical of 2.5 m")
     after = server.http.get("/cameras/corner/hints").json()
     assert after["proposed"]["sd"]["height_m"] < before / 2
-    assert after["items"][0]["off_sd"] < 2
+    assert after["items"][0]["residual_sd"] < 2
     assert axe(page) == []
     assert not too_wide(page)
     shoot(page, "hints")
@@ -213,7 +213,7 @@ def test_places_pointed_at_in_picture_and_plan_tell_where_it_stands(planned, ser
     pose = after["proposed"]["pose"]
     assert (pose["x_m"], pose["y_m"]) == pytest.approx(AT, abs=0.7)
     assert pose["heading_deg"] == pytest.approx(40, abs=2)
-    assert max(each["off_sd"] for each in after["items"]) < 3
+    assert max(each["residual_sd"] for each in after["items"]) < 3
     assert axe(page) == []
     assert not too_wide(page)
     page.set_viewport_size({"width": 390, "height": 844})

@@ -62,7 +62,7 @@ def test_true_marks_tell_the_pose_and_each_makes_it_surer(lens):
     error = found.values[:3] - plane_parameters_of(POSE)
     assert (np.abs(error) < sd).all()
     assert np.degrees(sd[:2]).max() < 2.0
-    assert max(found.off_sd) < 1.0
+    assert max(found.residual_sd) < 1.0
     assert found.values[3:].tolist() == [0.0, 0.0, 0.0]
 
 
@@ -93,7 +93,7 @@ def test_a_coarse_map_makes_north_less_sure(lens):
 
 def test_a_mark_that_lies_is_named(lens):
     marks = [vertical(lens, 2.5), vertical(lens, 2.5, 10.0, 3.0), length(lens), length(lens, 9.0)]
-    off = with_hints(MEAN, WIDE, marks, lens).off_sd
+    off = with_hints(MEAN, WIDE, marks, lens).residual_sd
     assert np.argmax(off) in (2, 3)
     assert max(off) > 3.0
 

@@ -8,7 +8,6 @@ from models.assessment import judge, may_be_alerted
 from models.assessment.scale_faults import clock_fault
 from models.geometry.pose import PARAMETERS, CameraPose, PoseParameters
 from models.monitoring.chart import ChartResult
-from models.monitoring.creep import Creep
 from models.monitoring.drift import (
     DriftLimits,
     MoveProbabilities,
@@ -16,6 +15,7 @@ from models.monitoring.drift import (
     pose_after,
     served_error,
 )
+from models.monitoring.slow_drift import SlowDrift
 from models.reasons import TracksCode
 
 PRIOR = CameraPose(height_m=6.0, tilt_rad=0.4, roll_rad=math.radians(179), heading_rad=2.0)
@@ -237,17 +237,19 @@ def test_a_wrong_clock_is_told_before_a_camera_that_stands():
 @pytest.mark.parametrize("crept", [None, 1.0, 50.0])
 def test_no_drift_is_told_of_what_may_not_be_told(drifted, moved, statistic, crept):
     """What is only told with a drift need not be computed before."""
-    chart = creep = None
+    chart = slow_drift = None
     if statistic is not None:
         chart = ChartResult(
             statistic=statistic, level=10.0, parameter=0, sign=1, walking_groups=20, track_idx=0,
             suspicious=True,
         )  # fmt: skip
     if crept is not None:
-        creep = Creep(statistic=crept, level=10.0, parameter=0, by=0.1, sd=0.01, since_day=1.0)
+        slow_drift = SlowDrift(
+            statistic=crept, level=10.0, parameter=0, by=0.1, sd=0.01, since_day=1.0
+        )
     now = drift(5.0, move=likely(moved, tilt=1.0))
-    told = judge(now, LIMITS, drifted, chart, creep).drifting
-    assert may_be_alerted(moved, LIMITS, creep, alerted=bool(drifted)) or not told
+    told = judge(now, LIMITS, drifted, chart, slow_drift).drifting
+    assert may_be_alerted(moved, LIMITS, slow_drift, alerted=bool(drifted)) or not told
     assert may_be_alerted(0.5, LIMITS, None, alerted=False) is False
 
 

@@ -192,7 +192,10 @@ def test_a_site_that_looks_alike_after_a_turn_says_so():
     assert "heading" not in fused.identifiable
     assert fused.reason is not None
     assert fused.reason.code is TracksCode.HEADING_AMBIGUOUS
-    turns_deg = [math.degrees(rival.values[3] - PRIOR.heading_rad) for rival in fused.rivals]
+    turns_deg = [
+        math.degrees(alternative.values[3] - PRIOR.heading_rad)
+        for alternative in fused.alternatives
+    ]
     turns_deg.append(math.degrees(fused.values[3] - PRIOR.heading_rad))
     assert min(abs(turn - 12) for turn in turns_deg) < 1.5
     assert np.degrees(fused.reason.values["turns_rad"]) == pytest.approx(sorted(turns_deg))

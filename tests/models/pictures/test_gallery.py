@@ -42,7 +42,7 @@ def test_no_match_is_no_turn():
     assert best_turn([], describe(wall(1)), LENS).turn is None
 
 
-def test_a_creep_does_not_hide_in_renewals():
+def test_renewals_do_not_hide_a_slow_drift():
     """Each picture has turned by 0.3 deg more, and is darker than the one before it."""
     gallery = renewed((), describe(wall()), None)
     for step in range(1, 6):

@@ -105,7 +105,7 @@ def look_after_alerts(http, bench):
             session, http.settings, "corner", "clock", "critical", {}, None, reasons=as_said("fast")
         )
         clock_id = clock.id
-    ask(http, "POST", f"/alerts/{clock_id}/resolve", json={"outcome": "mended"})
+    ask(http, "POST", f"/alerts/{clock_id}/resolve", json={"outcome": "fixed"})
     ask(http, "POST", "/cameras/corner/reference/reset")
 
 
@@ -147,7 +147,7 @@ def look_after_cameras(http, bench):
                 created_at=datetime.now(UTC),
             )
         )
-    ask(http, "POST", "/cameras/gate/pose/agree")
+    ask(http, "POST", "/cameras/gate/pose/confirm")
     ask(http, "DELETE", "/cameras/gate", headers=ANY)
 
 

@@ -13,7 +13,7 @@ from tests.service.conftest import problem
 from tests.stores.databases import ask
 
 FORM = {"Content-Type": "text/plain"}
-ACTS = [
+ACTIONS = [
     ("POST", "/cameras/corner/reference/reset"),
     ("POST", "/cameras/corner/trainings"),
     ("POST", "/cameras/corner/tracks"),
@@ -37,7 +37,7 @@ FOREIGN = [
 ]
 
 
-@pytest.mark.parametrize(("method", "path"), ACTS)
+@pytest.mark.parametrize(("method", "path"), ACTIONS)
 def test_no_page_of_others_acts(corner, method, path):
     trainings = corner.get("/cameras/corner/trainings").json()
     for headers in FOREIGN:

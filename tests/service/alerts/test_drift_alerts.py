@@ -267,7 +267,7 @@ def test_who_acknowledged_by_mistake_gives_it_back(bench):
     for by in ("Ada", "Bob"):  # the second time nothing happens
         back = bench.http.post(f"{url}/acknowledge", json={"by": by, "acknowledged": False}).json()
         assert (back["acknowledged"], back["acknowledged_by"]) == (False, None)
-    assert [(act["act"], act["by"]) for act in back["acts"]][-2:] == [
+    assert [(act["action"], act["by"]) for act in back["acts"]][-2:] == [
         ("acknowledged", "Ada"),
         ("given_back", "Ada"),
     ]

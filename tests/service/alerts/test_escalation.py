@@ -47,7 +47,7 @@ def test_it_is_told_once_and_said_on_the_pages(duty, inbox):
     told = inbox.received[-1].verified(duty.made["secret"])["data"]
     assert (told["id"], told["escalated_at"]) == (alert_id, show(duty, alert_id)["escalated_at"])
     (act,) = show(duty, alert_id)["acts"]
-    assert (act["act"], act["by"]) == ("escalated", None)
+    assert (act["action"], act["by"]) == ("escalated", None)
     assert "escalated: nobody took it up in 31 minutes" in duty.http.get("/ui/alerts").text
     duty.http.post(f"/alerts/{alert_id}/acknowledge", json={"by": "Ada"}).raise_for_status()
     page = duty.http.get("/ui/alerts").text

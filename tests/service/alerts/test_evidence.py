@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.geometry.pose import array_of
-from models.pose import Rival
+from models.pose import Alternative
 from service.estimation import estimates
 from tests.service.bench import PRIOR, made_up, moved
 
@@ -36,7 +36,7 @@ def test_an_alert_keeps_what_it_was_by(bench):
     assert body["offset"]["tilt_deg"] == pytest.approx(3.0, abs=1e-6)
     assert body["offset_sd"]["tilt_deg"] == pytest.approx(0.2, abs=1e-6)
     assert body["moved"] == bench.pose()["moved"]
-    assert (body["registered"], body["chart"], body["rivals"]) == (True, None, [])
+    assert (body["registered"], body["chart"], body["alternatives"]) == (True, None, [])
     assert body["tracks"] == bench.pose()["tracks"]
     assert body["from"] < body["to"]
 
@@ -67,7 +67,7 @@ def test_the_page_draws_what_was_weighed(bench):
 
 def test_a_pose_says_what_would_be_noticed_of_so_many_people(bench):
     bench.see(moved(), paths=True)
-    notice = bench.pose()["would_notice"]
+    notice = bench.pose()["detectable"]
     for field in ("tilt_deg", "roll_deg", "heading_deg", "height_m"):
         smallest = [notice[field][people] for people in ("60", "250", "800")]
         assert smallest == sorted(smallest, reverse=True)
@@ -80,23 +80,23 @@ def test_a_pose_says_what_would_be_noticed_of_so_many_people(bench):
 def test_a_site_that_is_deaf_to_a_pan_says_so_and_what_would_help(bench):
     bench.see(moved())
     pose = bench.pose()
-    assert pose["would_notice"]["heading_deg"] is None
-    assert pose["would_notice"]["tilt_deg"]["60"] > 0
+    assert pose["detectable"]["heading_deg"] is None
+    assert pose["detectable"]["tilt_deg"]["60"] > 0
     page = bench.http.get("/ui/cameras/corner").text
     assert "A pan would not be told: where people walk does not tell the heading." in page
 
 
-def test_a_camera_that_learns_would_notice_nothing_yet(bench):
+def test_learning_camera_has_no_detectable_move(bench):
     bench.http.post("/cameras/corner/reference/reset", json={}).raise_for_status()
     pose = bench.pose()
-    assert set(pose["would_notice"].values()) == {None}
-    assert pose["rivals"] == []
+    assert set(pose["detectable"].values()) == {None}
+    assert pose["alternatives"] == []
 
 
 def test_other_poses_that_explain_the_tracks_are_served_with_their_weights(bench):
     other = array_of(PRIOR) + np.radians([0, 0, 0, 60])
-    see_with(bench, moved(), rivals=(Rival(values=other, weight=0.3),))
-    (rival,) = bench.pose()["rivals"]
-    assert rival["weight"] == 0.3
-    assert rival["heading_deg"] == pytest.approx(np.degrees(PRIOR.heading_rad) + 60)
-    assert rival["height_m"] == pytest.approx(PRIOR.height_m)
+    see_with(bench, moved(), alternatives=(Alternative(values=other, weight=0.3),))
+    (alternative,) = bench.pose()["alternatives"]
+    assert alternative["weight"] == 0.3
+    assert alternative["heading_deg"] == pytest.approx(np.degrees(PRIOR.heading_rad) + 60)
+    assert alternative["height_m"] == pytest.approx(PRIOR.height_m)

@@ -122,7 +122,7 @@ def firing_of(http):
     return [(each["camera_id"], each["kind"], each["group_id"]) for each in items]
 
 
-@pytest.mark.parametrize("outcome", ["false_alarm", "mended"])
+@pytest.mark.parametrize("outcome", ["false_alarm", "fixed"])
 def test_answer_about_a_group_leaves_a_member_that_turned(http, together, outcome):
     """`false_alarm` ended the alert of a real turn of 8 deg."""
     group = group_of(http)

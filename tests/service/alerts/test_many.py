@@ -56,8 +56,8 @@ def test_alerts_are_chosen_by_kind_severity_and_time_and_paged(knocked):
 
 def test_many_are_answered_at_once_each_for_itself(knocked):
     ids = [alert["id"] for alert in firing(knocked)]
-    body = {"ids": [*ids, "nobody"], "act": "resolve", "outcome": "put_back", "by": "Ada"}
-    told = knocked.post("/acts", json=body).json()
+    body = {"ids": [*ids, "nobody"], "action": "resolve", "outcome": "put_back", "by": "Ada"}
+    told = knocked.post("/actions", json=body).json()
     items, undo = told["items"], told["undo"]
     assert [item["id"] for item in items] == [*ids, "nobody"]
     refused = [item["problem"]["status"] for item in items if item["problem"]]
@@ -69,22 +69,29 @@ def test_many_are_answered_at_once_each_for_itself(knocked):
     assert {alert["kind"] for alert in left} == {"clock"}
     until = (datetime.now(UTC) + timedelta(hours=2)).isoformat()
     two = [alert["id"] for alert in left]
-    for more in ({"act": "acknowledge", "by": "Ada"}, {"act": "silence", "until": until}):
-        done = knocked.post("/acts", json={"ids": two, **more}).json()
+    for more in ({"action": "acknowledge", "by": "Ada"}, {"action": "silence", "until": until}):
+        done = knocked.post("/actions", json={"ids": two, **more}).json()
         assert [item["problem"] for item in done["items"]] == [None, None]
         assert done["undo"] is None
     assert all(alert["silenced"] and alert["acknowledged"] for alert in firing(knocked))
-    back = {"ids": two, "act": "acknowledge", "acknowledged": False}
-    knocked.post("/acts", json=back).raise_for_status()
+    back = {"ids": two, "action": "acknowledge", "acknowledged": False}
+    knocked.post("/actions", json=back).raise_for_status()
     assert not any(alert["acknowledged"] for alert in firing(knocked))
-    body = {"ids": ["c00", "c01"], "act": "maintenance", "to": until}
-    assert [i["problem"] for i in knocked.post("/acts", json=body).json()["items"]] == [None] * 2
+    body = {"ids": ["c00", "c01"], "action": "maintenance", "to": until}
+    assert [i["problem"] for i in knocked.post("/actions", json=body).json()["items"]] == [None] * 2
     assert len(knocked.get("/cameras/c01/maintenance").json()["items"]) == 1
-    undone = knocked.post("/acts", json={"ids": ["c05", "c06"], "act": "undo"}).json()["items"]
+    undone = knocked.post("/actions", json={"ids": ["c05", "c06"], "action": "undo"}).json()[
+        "items"
+    ]
     assert [item["problem"] for item in undone] == [None, None]
     assert len(firing(knocked, kind="drift")) == 2
-    for wrong in ({"act": "silence"}, {"act": "resolve"}, {"act": "maintenance"}, {"act": "tag"}):
-        problem(knocked.post("/acts", json={"ids": two, **wrong}), 422, "malformed")
+    for wrong in (
+        {"action": "silence"},
+        {"action": "resolve"},
+        {"action": "maintenance"},
+        {"action": "tag"},
+    ):
+        problem(knocked.post("/actions", json={"ids": two, **wrong}), 422, "malformed")
 
 
 def test_a_file_of_them_runs_nothing_in_a_spreadsheet(knocked, fleet):

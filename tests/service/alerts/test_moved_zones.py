@@ -61,7 +61,7 @@ def test_people_who_crossed_a_line_and_who_were_missed(bench):
     for zone, told in zip(shown, alert["zones"], strict=True):
         for name in ("id", "on", "overlap", "in_view"):
             assert told[name] == pytest.approx(zone[name], abs=1e-6)
-    assert (alert["mended_zones"]["path"], alert["mended_zones"]["format"]) == (ZONES, None)
+    assert (alert["corrected_zones"]["path"], alert["corrected_zones"]["format"]) == (ZONES, None)
     with Store(bench.settings).read() as session:
         (delivery,) = session.query(DeliveryRecord).filter_by(webhook_id=hook["id"])
         assert delivery.payload["data"]["zones"] == alert["zones"]
@@ -69,11 +69,11 @@ def test_people_who_crossed_a_line_and_who_were_missed(bench):
     words = "of the last 9 who crossed it, 4 were missed, 3 were counted who did not cross it"
     assert posted["annotations"]["zones"].startswith("gate: ")
     assert f"{words}\nyard: " in posted["annotations"]["zones"]
-    assert posted["annotations"]["mended_zones"].startswith(f"https://here{ZONES} Have them")
+    assert posted["annotations"]["corrected_zones"].startswith(f"https://here{ZONES} Have them")
     page = bench.http.get("/ui/cameras/corner").text
     assert f"; {words}</li>" in section(page, "alerts")
     assert words in page.split('data-part="zones">')[1]
-    assert "download>The mended zones" not in page
+    assert "download>Corrected zones" not in page
     draw(bench.http, AREA | {"id": "gate"})  # what was counted was of another line
     assert words not in bench.http.get("/ui/cameras/corner").text
 
@@ -92,9 +92,9 @@ def test_frigates_zones_are_mended_by_a_person(bench, settings, monkeypatch):
     bench.http.put(ZONES, content=FRIGATE, headers=headers).raise_for_status()
     how = "Have them in place of this camera's in Frigate's configuration, and restart Frigate."
     path = f"{ZONES}?format=frigate"
-    assert knock(bench)["mended_zones"] == {"path": path, "format": "frigate", "how": how}
+    assert knock(bench)["corrected_zones"] == {"path": path, "format": "frigate", "how": how}
     said = section(bench.http.get("/ui/cameras/corner").text, "alerts")
-    assert f'<a href="{path}" download>The mended zones</a>. {how}' in said
+    assert f'<a href="{path}" download>Corrected zones</a>. {how}' in said
     assert "Frigate’s configuration</a>" not in said
     monkeypatch.setitem(vars(settings), "mqtt_frigate_url", "http://frigate:5000/")
     said = section(bench.http.get("/ui/cameras/corner").text, "alerts")
@@ -103,7 +103,7 @@ def test_frigates_zones_are_mended_by_a_person(bench, settings, monkeypatch):
 
 def test_without_zones_nothing_is_said(bench):
     alert = knock(bench)
-    assert (alert["zones"], alert["mended_zones"]) == (None, None)
+    assert (alert["zones"], alert["corrected_zones"]) == (None, None)
 
 
 def test_a_clock_moves_no_zone(bench):

@@ -247,7 +247,7 @@ def test_counts_outlive_their_tracks(street):
         assert len(session.get(RhythmRecord, "corner").counts["tracks"]) == DAYS * 12
 
 
-@pytest.mark.parametrize(("outcome", "rate"), [("mended", 12.0), ("false_alarm", 11.5)])
+@pytest.mark.parametrize(("outcome", "rate"), [("fixed", 12.0), ("false_alarm", 11.5)])
 def test_an_outage_is_not_learned_as_a_habit(street, outcome, rate):
     noon_outage(street)
     street.watch(datetime.fromtimestamp(MIDNIGHT_S + 15.5 * HOUR_S, UTC))
@@ -258,7 +258,7 @@ def test_an_outage_is_not_learned_as_a_habit(street, outcome, rate):
         session.get(RhythmRecord, "corner").learned_at -= timedelta(days=2)
     # Where nobody came, says the operator, these hours count.
     found = street.learns(time.time() + 60).rhythm.rates
-    assert (min(found[14], found[38]) == pytest.approx(12)) == (outcome == "mended")
+    assert (min(found[14], found[38]) == pytest.approx(12)) == (outcome == "fixed")
     assert min(found[14], found[38]) <= rate
 
 

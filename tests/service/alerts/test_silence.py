@@ -53,7 +53,7 @@ def test_a_later_silence_replaces_the_first_and_null_ends_it(drifting):
     silence(drifting, until=None).raise_for_status()  # there is none: nothing happens
     assert len(drifting.events("alert")) == told
     acts = drifting.http.get(drifting.url).json()["acts"]
-    assert [(act["act"], act["by"]) for act in acts] == [
+    assert [(act["action"], act["by"]) for act in acts] == [
         ("silenced", "Ada"),
         ("silenced", "Bob"),
         ("silence_ended", "Eve"),
@@ -93,7 +93,7 @@ def test_a_silenced_alert_that_grows_stays_silenced_and_says_so(drifting):
     event = drifting.events("alert")[-1]
     assert (event["severity"], event["silenced_by"]) == ("critical", "Ada")
     last = body["acts"][-1]
-    assert (last["act"], last["by"]) == ("grew", None)
+    assert (last["action"], last["by"]) == ("grew", None)
 
 
 def test_a_silence_that_has_come_to_its_time_is_told_of_once(drifting):
@@ -112,7 +112,7 @@ def test_a_silence_that_has_come_to_its_time_is_told_of_once(drifting):
     (event,) = drifting.events("alert")[told:]
     assert (event["state"], event["silenced_until"]) == ("firing", None)
     body = drifting.http.get(drifting.url).json()
-    assert (body["silence_reason"], body["acts"][-1]["act"]) == (None, "silence_ended")
+    assert (body["silence_reason"], body["acts"][-1]["action"]) == (None, "silence_ended")
     assert body["acts"][-1]["by"] is None
 
 
@@ -132,10 +132,10 @@ def test_what_was_done_is_kept_with_who_and_when(drifting):
     answer = {"outcome": "false_alarm", "note": "a parade", "by": "Eve"}
     drifting.http.post(f"{drifting.url}/resolve", json=answer).raise_for_status()
     seen, resolved = drifting.http.get(drifting.url).json()["acts"]
-    assert (seen["act"], seen["by"], seen["outcome"]) == ("acknowledged", "Ada", None)
+    assert (seen["action"], seen["by"], seen["outcome"]) == ("acknowledged", "Ada", None)
     assert resolved | {"at": ""} == {
         "at": "",
-        "act": "resolved",
+        "action": "resolved",
         "by": "Eve",
         "until": None,
         "outcome": "false_alarm",
@@ -148,7 +148,7 @@ def test_what_ends_by_itself_is_in_the_history_without_a_name(drifting):
     for _ in range(3):
         drifting.see(PRIOR)
     (act,) = drifting.http.get(drifting.url).json()["acts"]
-    assert (act["act"], act["outcome"], act["by"]) == ("resolved", "cleared", None)
+    assert (act["action"], act["outcome"], act["by"]) == ("resolved", "cleared", None)
 
 
 def test_acts_go_with_their_camera(drifting):

@@ -178,9 +178,9 @@ def test_put_back_is_one_thing_however_it_is_said(bench, put_back):
 
 def test_the_page_offers_put_back_and_learning_anew_as_what_they_are(bench):
     text = bench.http.get("/ui/cameras/corner").text
-    put_back = text.split('data-act="put-back"')[1].split("</div>")[0]
+    put_back = text.split('data-action="put-back"')[1].split("</div>")[0]
     assert "What was learned there stays" in put_back
-    relearn = text.split('data-act="relearn"')[1].split("</div>")[0]
+    relearn = text.split('data-action="relearn"')[1].split("</div>")[0]
     assert "a new reference of 200 people begins" in relearn
 
 
@@ -274,25 +274,25 @@ def test_a_clock_fault_makes_no_false_height_the_pose(clocked):
     for outcome in ("accepted", "put_back"):
         said = problem(clocked.http.post(url, json={"outcome": outcome}), 422, "malformed")
         assert said["errors"][0]["pointer"] == "/outcome"
-        assert "mended or false_alarm" in said["detail"]
+        assert "fixed or false_alarm" in said["detail"]
     problem(clocked.http.post("/cameras/corner/pose/accept"), 409, "conflict")
     assert clocked.http.get("/cameras/corner").json()["prior_pose"]["height_m"] == 6.0
     assert states(clocked.http) == {"drifting"}
     page = clocked.http.get("/ui/cameras/corner").text
     assert "<title>Clock: The corner" in page
-    assert 'data-outcome="mended"' in page
+    assert 'data-outcome="fixed"' in page
     assert 'data-outcome="accepted"' not in page
     assert re.search(r"<b>1</b> Clock", clocked.http.get("/").text)
     assert moved_count(clocked.http) == 0
 
 
 def test_a_mended_clock_is_judged_by_who_comes_then(clocked):
-    resolve(clocked, "mended", note="NTP was off")
+    resolve(clocked, "fixed", note="NTP was off")
     (alert,) = clocked.alerts()
-    assert (alert["outcome"], alert["resolved_by"]) == ("mended", "Ada")
+    assert (alert["outcome"], alert["resolved_by"]) == ("fixed", "Ada")
     assert states(clocked.http) == {"learning"}
-    assert "since the clock was mended" in clocked.pose()["reason"]
-    assert "Ada said that it was put right. NTP was off" in told_history(clocked.http)
+    assert "since the clock was fixed" in clocked.pose()["reason"]
+    assert "Ada reported it as fixed. NTP was off" in told_history(clocked.http)
     clocked.see(PRIOR)
     assert states(clocked.http) == {"ok"}
 
@@ -312,8 +312,8 @@ def test_other_alerts_are_mended_or_false(bench):
         )  # fmt: skip
     url = f"/alerts/{bench.alerts()[0]['id']}/resolve"
     problem(bench.http.post(url, json={"outcome": "put_back"}), 422, "malformed")
-    resolve(bench, "mended")
-    assert bench.alerts()[0]["outcome"] == "mended"
+    resolve(bench, "fixed")
+    assert bench.alerts()[0]["outcome"] == "fixed"
 
 
 def test_the_note_of_an_accepted_pose_is_kept(bench):

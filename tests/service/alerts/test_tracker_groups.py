@@ -180,11 +180,11 @@ def test_resolving_it_resolves_its_members_the_same_way(town):
     for n in range(4):
         town.moves(n)
     url = f"/alerts/{town.group()['id']}"
-    answer = {"outcome": "mended", "note": "frame rate set right", "by": "Ada"}
+    answer = {"outcome": "fixed", "note": "frame rate set right", "by": "Ada"}
     body = town.http.post(f"{url}/resolve", json=answer).json()
-    assert (body["state"], body["outcome"]) == ("resolved", "mended")
+    assert (body["state"], body["outcome"]) == ("resolved", "fixed")
     found = {(a["state"], a["outcome"], a["note"], a["resolved_by"]) for a in town.alerts()}
-    assert found == {("resolved", "mended", "frame rate set right", "Ada")}
+    assert found == {("resolved", "fixed", "frame rate set right", "Ada")}
     assert len(town.alerts()) == 5
     assert [act["by"] for act in body["acts"]] == ["Ada"]
     problem(town.http.post(f"{url}/resolve", json=answer), 409, "conflict")
@@ -304,7 +304,7 @@ def test_its_pages_have_words_of_its_own_and_its_members_lead_to_it(town):
     parts = town.http.get("/ui/alerts").text.split('<li class="alert-row"')[1:]
     rows = [part.split("</li>")[0] for part in parts]
     (own,) = [row for row in rows if f'data-id="{group["id"]}"' in row]
-    assert re.findall(r'data-outcome="(\w+)"', own) == ["mended", "false_alarm"]
+    assert re.findall(r'data-outcome="(\w+)"', own) == ["fixed", "false_alarm"]
     assert "Many moved" in own
     assert "Clock" not in own
     assert "The tracker, its clock or frame rate is as it should be." in own

@@ -80,7 +80,7 @@ def test_a_mended_clock_is_taken_back(bench):
     for _ in range(3):
         bench.see(moved(height_m=1.32))
     before = picture(bench)
-    resolve(bench, "mended")
+    resolve(bench, "fixed")
     bench.http.post(URL).raise_for_status()
     assert picture(bench) == before
 
@@ -123,5 +123,5 @@ def test_an_answer_about_the_camera_that_had_the_id_before_is_none_of_this_one(b
     bench.http.delete("/cameras/corner", headers=headers).raise_for_status()
     bench.http.post("/cameras", json=CAMERA).raise_for_status()
     problem(bench.http.post(URL), 409, "conflict")
-    many = bench.http.post("/acts", json={"act": "undo", "ids": ["corner"]})
+    many = bench.http.post("/actions", json={"action": "undo", "ids": ["corner"]})
     assert many.status_code == 200

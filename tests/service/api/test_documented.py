@@ -74,3 +74,22 @@ def test_no_body_but_a_tokens_is_closed_to_fields_of_a_newer_version(http):
 
 def test_the_api_has_the_version_of_its_release(http):
     assert http.get("/openapi.json").json()["info"]["version"] == version("surefoot")
+
+
+def test_each_route_has_a_name_and_a_summary_of_its_own(http):
+    paths = http.get("/openapi.json").json()["paths"]
+    operations = [each for methods in paths.values() for each in methods.values()]
+    ids = [each["operationId"] for each in operations]
+    summaries = [each["summary"] for each in operations]
+    assert len(set(ids)) == len(ids)
+    assert len(set(summaries)) == len(summaries)
+    for operation_id, summary in zip(ids, summaries, strict=True):
+        assert "_" in operation_id, operation_id  # a verb and an object, not "show"
+        assert 2 <= len(summary.split()) <= 12, summary
+        assert summary[0].isupper(), summary
+        assert not summary.endswith("."), summary
+    named = paths["/cameras/{camera_id}/sources/{source}/use"]["post"]
+    assert (named["operationId"], named["summary"]) == (
+        "activate_source",
+        "Activate a source of tracks",
+    )

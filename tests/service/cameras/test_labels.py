@@ -99,8 +99,8 @@ def test_what_is_found_comes_in_pages(campus):
 
 
 def test_many_are_tagged_at_once_each_for_itself(campus):
-    body = {"ids": ["a", "d", "gone"], "act": "tag", "add": ["night"], "remove": ["outdoor"]}
-    items = campus.post("/acts", json=body | {"by": "Ada"}).json()["items"]
+    body = {"ids": ["a", "d", "gone"], "action": "tag", "add": ["night"], "remove": ["outdoor"]}
+    items = campus.post("/actions", json=body | {"by": "Ada"}).json()["items"]
     assert [item["problem"] and item["problem"]["status"] for item in items] == [None, None, 404]
     assert campus.get("/cameras/a").json()["tags"] == ["night", "nvr-east"]
     assert campus.get("/cameras/d").json()["tags"] == ["night"]
@@ -109,14 +109,14 @@ def test_many_are_tagged_at_once_each_for_itself(campus):
         ("camera.described", "a"),
         ("camera.described", "d"),
     ]
-    full = {"ids": ["a"], "act": "tag", "add": [f"t{n}" for n in range(19)]}
-    (refused,) = campus.post("/acts", json=full).json()["items"]
+    full = {"ids": ["a"], "action": "tag", "add": [f"t{n}" for n in range(19)]}
+    (refused,) = campus.post("/actions", json=full).json()["items"]
     assert refused["problem"]["detail"] == "tags: at most 20 are taken, it would have 21"
     before = campus.get("/cameras/a").headers["ETag"]
-    again = {"ids": ["a"], "act": "tag", "add": ["night"]}
-    assert campus.post("/acts", json=again).json()["items"][0]["problem"] is None
+    again = {"ids": ["a"], "action": "tag", "add": ["night"]}
+    assert campus.post("/actions", json=again).json()["items"][0]["problem"] is None
     assert campus.get("/cameras/a").headers["ETag"] == before  # nothing was changed
-    problem(campus.post("/acts", json={"ids": ["a"], "act": "tag"}), 422, "malformed")
+    problem(campus.post("/actions", json={"ids": ["a"], "action": "tag"}), 422, "malformed")
 
 
 def test_open_pages_are_told_and_the_log_says_who(campus, settings):
@@ -126,7 +126,7 @@ def test_open_pages_are_told_and_the_log_says_who(campus, settings):
         before = journal.newest_event_id(session)
     body = {"site": "quay", "name": "Crane", "by": "Ada"}
     campus.patch("/cameras/b", json=body, headers=ANY).raise_for_status()
-    campus.post("/acts", json={"ids": ["c"], "act": "tag", "add": ["x"]}).raise_for_status()
+    campus.post("/actions", json={"ids": ["c"], "action": "tag", "add": ["x"]}).raise_for_status()
     campus.delete("/cameras/d", params={"by": "Ines"}, headers=ANY).raise_for_status()
     with store.read() as session:
         events = journal.events_after(session, before, 100)

@@ -76,7 +76,7 @@ def test_another_source_moves_nothing_and_is_told(known):
     known.look()
     assert served(known.pose()) == served(before)
     page = known.http.get("/ui/cameras/corner").text
-    assert 'data-act="use-source" data-source="stranger"' in page
+    assert 'data-action="use-source" data-source="stranger"' in page
     assert "tracker-1.2</strong>: its tracks count" in page
     after = known.reference()
     assert (after.id, after.data, after.source) == (reference.id, reference.data, "tracker-1.2")

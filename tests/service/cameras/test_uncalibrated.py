@@ -26,28 +26,28 @@ def test_people_tell_its_pose_a_person_agrees_and_drift_is_told_against_it(stree
     before = street.look()
     assert (before["state"], before["reason_code"]) == ("uncalibrated", "pose_proposed")
     proposed, sd = before["proposed"]["pose"], before["proposed"]["sd"]
-    assert before["proposed"]["can_be_agreed"]
+    assert before["proposed"]["can_be_confirmed"]
     assert abs(proposed["tilt_deg"] - 22.0) < 2 * sd["tilt_deg"] < 5.0
     assert abs(proposed["height_m"] - 6.0) < 2 * sd["height_m"]
-    # Nobody is served by what nobody has agreed to, and nothing is learned or alarmed.
+    # Until the pose is confirmed, nothing is estimated, learned or alarmed.
     assert (before["estimated"], before["drift"], street.alerts()) == ([], None, [])
     problem(street.http.get("/cameras/corner/pose.yaml"), 409, "conflict")
     told = problem(street.http.post("/cameras/corner/ground", json={"points": []}), 409, "conflict")
-    assert told["detail"] == "pose: nobody has agreed to a prior pose yet"
+    assert told["detail"] == "pose: no prior pose has been confirmed yet"
     gate = {"zones": [{"id": "gate", "points": [[400, 350.5], [800, 361], [900, 600]]}]}
     drawn = street.http.put("/cameras/corner/zones", json=gate, headers={"If-Match": "*"})
     assert drawn.raise_for_status().json()["by"]["pose"] is None
 
-    agreed = street.http.post("/cameras/corner/pose/agree", json={"by": "Ada"})
-    assert agreed.status_code == 200
-    assert (agreed.json()["state"], agreed.json()["proposed"]) == ("learning", None)
+    confirmed = street.http.post("/cameras/corner/pose/confirm", json={"by": "Ada"})
+    assert confirmed.status_code == 200
+    assert (confirmed.json()["state"], confirmed.json()["proposed"]) == ("learning", None)
     assert street.http.get("/cameras/corner").json()["prior_pose"] == proposed
     entries = street.http.get("/activity", params={"camera_id": "corner"}).json()["items"]
-    assert ("pose.agreed", "Ada") in [(each["what"], each["by"]) for each in entries]
+    assert ("pose.confirmed", "Ada") in [(each["what"], each["by"]) for each in entries]
     # Whoever was seen so far makes the reference: it need not be waited for.
     after = street.look()
     assert (after["state"], after["reference"]["state"]) in [("ok", "ready"), ("learning", "ready")]
-    problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
+    problem(street.http.post("/cameras/corner/pose/confirm"), 409, "conflict")
 
     zones = street.http.get("/cameras/corner/zones").json()
     assert (zones["moved"], zones["by"]["pose"]) == (False, proposed)
@@ -63,7 +63,7 @@ def test_people_tell_its_pose_a_person_agrees_and_drift_is_told_against_it(stree
 
 
 def test_too_few_people_are_told_and_cannot_be_agreed_to(street):
-    problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
+    problem(street.http.post("/cameras/corner/pose/confirm"), 409, "conflict")
     street.cross(PRIOR, 2)
     few = street.look()
     assert (few["state"], few["proposed"], few["reason_code"]) == (
@@ -73,8 +73,8 @@ def test_too_few_people_are_told_and_cannot_be_agreed_to(street):
     street.cross(PRIOR, 20)  # all one way
     one_way = street.look()
     assert one_way["reason_code"] == "pose_untold"
-    assert not one_way["proposed"]["can_be_agreed"]
-    problem(street.http.post("/cameras/corner/pose/agree"), 409, "conflict")
+    assert not one_way["proposed"]["can_be_confirmed"]
+    problem(street.http.post("/cameras/corner/pose/confirm"), 409, "conflict")
 
 
 def test_measured_height_gives_the_sd_of_a_tape(http, settings):
@@ -115,10 +115,10 @@ def test_patch_takes_measurements_until_there_is_a_prior_pose(street):
         assert found["sd"]["height_m"] <= 0.05 * found["pose"]["height_m"]
         assert found["sd"]["roll_deg"] == pytest.approx(0.71, abs=0.03)
         assert abs(found["pose"]["roll_deg"] - 1.0) < 2 * found["sd"]["roll_deg"]
-    street.http.post("/cameras/corner/pose/agree").raise_for_status()
-    agreed = street.http.get("/cameras/corner").json()
-    assert agreed["measured"] is None
-    assert agreed["prior_pose"]["height_m"] == pytest.approx(found["pose"]["height_m"])
+    street.http.post("/cameras/corner/pose/confirm").raise_for_status()
+    confirmed = street.http.get("/cameras/corner").json()
+    assert confirmed["measured"] is None
+    assert confirmed["prior_pose"]["height_m"] == pytest.approx(found["pose"]["height_m"])
     again = street.http.patch("/cameras/corner", json={"prior_pose": given}, headers=headers)
     assert problem(again, 409, "conflict")["detail"] == (
         "prior_pose: the camera has one; height_m and tilt_deg are both required to replace it "
@@ -131,7 +131,7 @@ def test_measured_height_keeps_its_sd_with_too_few_people(http, settings):
     street = Street(http, settings)
     street.cross(PRIOR, 20)  # all one way
     found = street.look()["proposed"]
-    assert not found["can_be_agreed"]
+    assert not found["can_be_confirmed"]
     assert found["sd"]["height_m"] <= 0.055 * found["pose"]["height_m"]
     assert found["pose"]["height_m"] == pytest.approx(6.0, rel=0.05)
 
@@ -191,13 +191,13 @@ def test_a_person_helps_with_marks_and_takes_them_back(street):
     by_people = street.look()["proposed"]
     with_people = street.http.get(path).json()
     assert by_people == with_people["proposed"]
-    assert max(mark["off_sd"] for mark in with_people["items"]) < 1.5
+    assert max(mark["residual_sd"] for mark in with_people["items"]) < 1.5
     assert by_people["pose"]["height_m"] == pytest.approx(6.0, rel=0.05)
     back = street.http.put(path, json=[]).json()
     assert back["items"] == []
     assert back["proposed"]["sd"]["height_m"] > 2 * by_people["sd"]["height_m"]
-    agreed = street.http.post("/cameras/corner/pose/agree")
-    assert agreed.status_code == 200
+    confirmed = street.http.post("/cameras/corner/pose/confirm")
+    assert confirmed.status_code == 200
     problem(street.http.put(path, json=marks()), 409, "conflict")
 
 
@@ -237,7 +237,7 @@ def test_marks_stay_where_the_walking_speed_is_changed_and_go_with_the_pictures_
 def test_a_pose_stays_as_sure_as_it_was_agreed_to(street):
     street.keep_to_lanes(PRIOR, 60)
     street.look()
-    street.http.post("/cameras/corner/pose/agree").raise_for_status()
+    street.http.post("/cameras/corner/pose/confirm").raise_for_status()
 
     def sure():
         points = {"points": [[600, 600]]}

@@ -105,10 +105,20 @@ def value(text):
     return yaml.safe_load(text)
 
 
-def test_none_are_drawn_at_first_and_drawing_is_by_version(corner):
+def test_first_put_needs_no_if_match_and_a_later_one_does(corner):
+    first = put(corner, {"zones": [GATE]}, etag=None).raise_for_status()
+    assert [zone["id"] for zone in first.json()["zones"]] == [GATE["id"]]
+    later = put(corner, {"zones": []}, etag=None)
+    assert problem(later, 428, "precondition_required")["etag"] == first.headers["etag"]
+    assert corner.get(URL).json() == first.json()
+    put(corner, {"zones": []}, etag=first.headers["etag"]).raise_for_status()
+    problem(put(corner, {"zones": [GATE]}, etag=None), 428, "precondition_required")
+
+
+def test_put_of_zones_requires_the_version_that_was_read(corner):
     first = corner.get(URL).raise_for_status()
     assert first.json()["zones"] == []
-    problem(put(corner, {"zones": []}, etag=None), 428, "precondition_required")
+    problem(put(corner, {"zones": []}, etag='"other"'), 412, "precondition_failed")
     drawn = put(corner, {"zones": [GATE, WALL, LINE]}, etag=first.headers["etag"])
     assert drawn.raise_for_status().headers["etag"] != first.headers["etag"]
     stale = put(corner, {"zones": []}, etag=first.headers["etag"])

@@ -31,7 +31,7 @@ def running(tmp_path, migrated):
             server.fleet.add(name)
         with server.fleet.store.write() as session:
             register_worker(session, "made-up", 1)
-            session.execute(update(CameraRecord).values(looked_at_pk=1000))  # no track waits
+            session.execute(update(CameraRecord).values(read_track_pk=1000))  # no track waits
         yield server
         server.fleet.close()
 

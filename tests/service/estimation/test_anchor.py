@@ -1,4 +1,4 @@
-"""The anchor: the first map stays, days are held against it once, and a creep is told by it."""
+"""The anchor: each day is scored once against the first map, which detects slow drift."""
 
 import math
 import time
@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import select
 
 from models.durations import DAY_S
-from models.monitoring.creep import creep_log_from_bytes
+from models.monitoring.slow_drift import slow_drift_log_from_bytes
 from service.estimation.anchoring import (
     compute_anchor_days,
     load_anchor_days,
@@ -72,7 +72,7 @@ def due(street):
 
 def days_of(street):
     record = anchor(street)
-    return [] if record.creep is None else list(creep_log_from_bytes(record.creep).day_idx)
+    return [] if record.creep is None else list(slow_drift_log_from_bytes(record.creep).day_idx)
 
 
 @pytest.mark.nightly
@@ -188,7 +188,7 @@ def test_the_newest_may_be_of_a_move_though_the_window_is_shorter(known):
 
 @pytest.mark.nightly
 @pytest.mark.timeout(900)
-def test_a_creep_is_told_and_the_pose_is_by_the_first_map(known):
+def test_slow_drift_is_reported_and_the_pose_is_measured_by_the_first_map(known):
     live(known, 10)
     assert known.pose()["state"] == "ok"
     assert known.alerts() == []
@@ -198,8 +198,8 @@ def test_a_creep_is_told_and_the_pose_is_by_the_first_map(known):
         turned += 0.5
     (alert,) = known.alerts(state="firing")
     assert alert["kind"] == "drift"
-    assert alert["reason_code"] == "crept"
-    assert "has crept by +" in alert["reason"]
+    assert alert["reason_code"] == "slow_drift"
+    assert "has drifted slowly by +" in alert["reason"]
     assert alert["reason_values"]["number"] == "heading"
     assert turned < 2.5
     body = known.look()
@@ -207,7 +207,7 @@ def test_a_creep_is_told_and_the_pose_is_by_the_first_map(known):
     off, sd = body["drift"]["heading_deg"] - turned, body["sd"]["heading_deg"]
     assert abs(off) < 3 * sd
     assert abs(off) < 1.0
-    # It is a person's word that the camera may stay so: then this is the pose to creep from.
+    # The operator accepts the position: slow drift is measured from this pose on.
     known.http.post("/cameras/corner/pose/accept", json={"by": "Ada"}).raise_for_status()
     assert anchor(known) is None
     assert known.alerts(state="firing") == []

@@ -88,7 +88,7 @@ def test_a_model_without_weights_blinds_nobody_and_is_trained_anew(street, damag
     body = street.look()
     assert (body["state"], body["tracks"]) == ("ok", 30)
     assert "without the averaged estimate: the weights of its model" in body["reason"]
-    (lack,) = camera(street).lacks
+    (lack,) = camera(street).missing_parts
     assert (lack.code, lack.values["part"]) == (ServiceCode.WITHOUT_PART, "averaged estimate")
     with street.context.store.write() as session:
         found = reconciliation.reconcile_camera(
@@ -97,7 +97,7 @@ def test_a_model_without_weights_blinds_nobody_and_is_trained_anew(street, damag
     assert "camera without a model" in found
     street.keep_to_lanes(PRIOR, 5)
     street.look()
-    assert camera(street).lacks == ()
+    assert camera(street).missing_parts == ()
 
 
 @pytest.mark.parametrize("part", ["data", "chart"])
@@ -122,13 +122,13 @@ def test_a_map_that_cannot_grow_is_left_as_it_was(street):
     street.keep_to_lanes(PRIOR, 100)
     body = street.look()
     assert (body["state"], body["tracks"]) == ("ok", 40)
-    (lack,) = camera(street).lacks
+    (lack,) = camera(street).missing_parts
     assert lack.values["part"] == "growth_of_the_flow_map"
     page = " ".join(street.http.get("/ui/cameras/corner").text.split())
     assert "Without the growth of the flow map" in page
     street.keep_to_lanes(PRIOR, 5)  # it rests for an hour; what is lacking is not forgotten
     street.look()
-    assert camera(street).lacks == (lack,)
+    assert camera(street).missing_parts == (lack,)
     with street.context.store.read() as session:
         assert session.get(FlowMapRecord, reference.id).learned_at == before
 
@@ -212,7 +212,7 @@ def test_a_camera_that_workers_die_of_is_left_alone_for_a_while(newcomer):
     spoil(newcomer, CameraRecord, estimate_tries=2, estimate_error=None, estimate_due_at=None,
           estimate_after=datetime.now(UTC) + timedelta(seconds=cooldown_s(2)))  # fmt: skip
     run_estimate(newcomer.context, "corner")  # the engine runs it again at once
-    assert camera(newcomer).looked_at_pk != 90
+    assert camera(newcomer).read_track_pk != 90
     assert "died" in camera(newcomer).estimate_error
     assert camera(newcomer).estimate_due_at is not None
     # The clock was set back by a day: what lies that far ahead is waited for no longer.

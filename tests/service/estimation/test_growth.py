@@ -309,7 +309,7 @@ def test_a_map_with_tracks_of_a_move_in_it_is_learned_without_them(known):
     assert map_of(known).learned_at == again.learned_at
 
 
-def test_a_map_grows_of_a_crowd_that_loses_ends_to_a_creep(known, monkeypatch):
+def test_map_grows_from_a_crowd_that_loses_ends_to_slow_drift(known, monkeypatch):
     """What a camera that had not crept would not have shown is cut off: another order of ends."""
     known.keep_to_lanes(PRIOR, 49 + WINDOW)
     known.look()
@@ -328,8 +328,8 @@ def test_a_map_grows_of_a_crowd_that_loses_ends_to_a_creep(known, monkeypatch):
         taken["weights"] = weights
         return learn_site(observations, *args, weights=weights, **how)
 
-    monkeypatch.setattr(growth, "creep_log_from_bytes", lambda _: None)
-    monkeypatch.setattr(growth, "without_creep", lambda *_: [None, *cut[1:]])
+    monkeypatch.setattr(growth, "slow_drift_log_from_bytes", lambda _: None)
+    monkeypatch.setattr(growth, "without_slow_drift", lambda *_: [None, *cut[1:]])
     monkeypatch.setattr(growth, "learn_site", learn)
     anchor = SimpleNamespace(record=SimpleNamespace(creep=b""), from_s=None)
     weights = np.linspace(0.5, 1.0, len(cut))

@@ -57,7 +57,7 @@ def test_a_lens_that_was_zoomed_is_named_and_put_right(street):
     assert "The lens shows another angle of view" in page
     assert "Keep the new aim" not in page
     resolve = f"/alerts/{alert['id']}/resolve"
-    street.http.post(resolve, json={"outcome": "mended"}).raise_for_status()
+    street.http.post(resolve, json={"outcome": "fixed"}).raise_for_status()
     street.keep_to_lanes(PRIOR, 60)
     assert (street.look()["state"], street.alerts(state="firing")) == ("ok", [])
 

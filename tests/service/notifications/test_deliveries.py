@@ -269,7 +269,7 @@ def test_tracks_that_wait_still_are_told_of_once_though_another_worker_watches(p
     (alert,) = post_room.http.get("/alerts").json()["items"]
     assert (alert["kind"], alert["state"]) == ("stale", "firing")
     with post_room.store.write() as session:  # now they are looked at
-        session.get(CameraRecord, "corner").looked_at_pk = tracks.newest_pk(session, "corner")
+        session.get(CameraRecord, "corner").read_track_pk = tracks.newest_pk(session, "corner")
     assert watch(second) == {"corner": "ended"}
 
 

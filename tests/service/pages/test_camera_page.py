@@ -57,7 +57,7 @@ def test_a_knocked_camera_says_how_far_since_when_and_how_sure(bench):
     text = page(bench.http)
     assert "A person at 10 m is now placed 2.4 m too far" in text
     assert 'class="grid served"' in text
-    assert text.count('data-act="acknowledge"') == 1
+    assert text.count('data-action="acknowledge"') == 1
     assert "by more than 1 deg or 0.3 m" in text  # the reason, as the API says it
 
 
@@ -107,12 +107,12 @@ def test_flags_and_deeds_say_who_did_what(bench):
     assert "Bo silenced the alert “the camera moved” until" in text
     assert "the &lt;fair&gt;" in text
     assert "Cy planned maintenance until" in text
-    assert 'data-act="unsilence"' in text
+    assert 'data-action="unsilence"' in text
     http.post("/cameras/corner/pose/accept", json={"by": "Ada"}).raise_for_status()
     text = page(http)
     assert "Ada kept the new aim." in text
     assert "Past alerts (1)" in text
-    assert 'data-act="acknowledge"' not in text
+    assert 'data-action="acknowledge"' not in text
 
 
 def test_names_are_never_markup(http):

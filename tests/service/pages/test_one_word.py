@@ -6,7 +6,7 @@ import re
 import pytest
 
 from service.enums import Answer
-from service.wording.acts import ACTS
+from service.wording.actions import ACTIONS
 from tests.service.alerts.test_states import knock
 from tests.service.bench import PRIOR, moved
 from tests.test_architecture import ROOT
@@ -20,7 +20,7 @@ OTHERS = (
 WORDS = {
     "put_back": "put back",
     "accepted": "new aim",
-    "mended": "put right",
+    "fixed": "fixed",
     "false_alarm": "false alarm",
 }
 
@@ -37,7 +37,7 @@ def buttons(text, attribute, value):
 
 @pytest.mark.parametrize("answer", list(Answer))
 def test_each_answer_has_one_word_wherever_it_stands(bench, answer):
-    if answer == Answer.MENDED:
+    if answer == Answer.FIXED:
         bench.see(PRIOR)
         for _ in range(3):
             bench.see(moved(height_m=1.32))
@@ -46,15 +46,15 @@ def test_each_answer_has_one_word_wherever_it_stands(bench, answer):
     (alert,) = bench.alerts(state="firing")
     bench.http.post(f"/alerts/{alert['id']}/acknowledge", json={"by": "Bo"}).raise_for_status()
     before = pages(bench.http)
-    words = ACTS[answer]
+    words = ACTIONS[answer]
     for path, text in before.items():
         assert re.findall(OTHERS, text) == [], path
         assert buttons(text, "data-outcome", answer) <= {words.one}, path
         assert buttons(text, "data-takes", answer) <= {words.many}, path
     assert "acknowledged by Bo" in before["/"]
     assert buttons(before["/ui/cameras/corner"], "data-outcome", answer) == {words.one}
-    body = {"ids": [alert["id"]], "act": "resolve", "outcome": answer, "by": "Ada"}
-    told = bench.http.post("/acts", json=body).json()
+    body = {"ids": [alert["id"]], "action": "resolve", "outcome": answer, "by": "Ada"}
+    told = bench.http.post("/actions", json=body).json()
     assert told["undo"]["ids"] == ["corner"]
     after = pages(bench.http)
     for path in ("/ui/alerts?all=true", "/ui/cameras/corner", "/ui/report"):

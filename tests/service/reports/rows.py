@@ -41,7 +41,7 @@ def some_weeks(fleet: Fleet) -> None:
     put(fleet, "b", "drift", "c2", "25 08:00", resolved_by="Bo", resolved_at="25 08:30",
         outcome="false_alarm")  # fmt: skip
     put(fleet, "c", "clock", "c1", "20 08:00", resolved_by="Bo", resolved_at="24 08:00",
-        outcome="mended")  # fmt: skip
+        outcome="fixed")  # fmt: skip
     put(fleet, "d", "no_data", "c3", "10 08:00", resolved_at="12 08:00", outcome="cleared")
     put(fleet, "e", "many_moved", None, "26 08:00", camera_ids=["c1", "c2", "c3"],
         track_source="bytetrack", resolved_at="26 09:00", outcome="cleared")  # fmt: skip

@@ -27,7 +27,7 @@ def test_a_shift_has_what_was_told_done_and_is_open(http, fleet):
         fleet.add(f"c{n}", f"Corner {n}", tilt_deg=3.0)
     ids = [fleet.knock(f"c{n}") for n in range(4)]
     http.post(
-        "/acts", json={"ids": ids[:2], "act": "resolve", "outcome": "put_back", "by": "Ada"}
+        "/actions", json={"ids": ids[:2], "action": "resolve", "outcome": "put_back", "by": "Ada"}
     ).raise_for_status()
     http.post(f"/alerts/{ids[2]}/acknowledge", json={"by": "Ada"}).raise_for_status()
     silence = {"until": hours(3), "by": "Bo", "reason": "the fair"}
@@ -58,7 +58,7 @@ def test_a_shift_has_what_was_told_done_and_is_open(http, fleet):
 
 
 def test_of_more_acts_than_are_shown_the_last_ones_are(http, fleet, monkeypatch):
-    monkeypatch.setattr(handover, "_MOST_ACTS", 2)
+    monkeypatch.setattr(handover, "_MOST_ACTIONS", 2)
     fleet.add("c0", "Corner 0", tilt_deg=3.0)
     alert_id = fleet.knock("c0")
     for name in ("Ada", "Bo", "Cy"):

@@ -148,7 +148,7 @@ def test_a_mail_says_what_the_report_says(settings):
         "",
         "Clocks and lenses (1)",
         "- Corner 1: people seem to walk too fast or too slowly: its clock or frame rate looks "
-        "wrong, since Fri 20 Mar, 09:00; put right by Bo after 4 days",
+        "wrong, since Fri 20 Mar, 09:00; fixed by Bo after 4 days",
         "",
         "Other alerts (1)",
         "- 3 cameras of bytetrack: a wrong clock, since Thu 26 Mar, 09:00; ended by itself after "

@@ -58,10 +58,10 @@ SAID = [
     (T.CHART, {"number": "times", "sign": 1, "parties": 20, "statistic": 30.4, "level": 8.6},
      "the last 20 walking groups walk as they would if all times were too long "
      "(drift chart: 30, alarm at 9)"),
-    (T.CREPT, {"number": "heading", "by_rad": math.radians(1.24), "sd_rad": math.radians(0.3),
+    (T.SLOW_DRIFT, {"number": "heading", "by_rad": math.radians(1.24), "sd_rad": math.radians(0.3),
                "since": "2026-08-20T07:12:00+00:00", "statistic": 17.2, "level": 14.4},
-     "has crept by +1.2 deg (sd 0.3) in heading since 2026-08-20, by the first map and speeds of "
-     "its reference (creep: 17, alarm at 14)"),
+     "has drifted slowly by +1.2 deg (sd 0.3) in heading since 2026-08-20, relative to the first "
+     "map and speeds of its reference (score 17, alarm at 14)"),
     (T.SCALE_CHANGED, {"factor": 1.2, "rate_hz": 25.0},
      "the scale has changed by +20 % and the angles have not: as if 30 frames a second were taken "
      "for 25, or the camera was raised"),
@@ -124,8 +124,8 @@ SAID = [
      "roll, 1.6 m in height); more people help, and such as walk other ways"),
     (S.POSE_PROPOSED, {"tracks": 70, "groups": 64, "tilt_sd_rad": math.radians(1),
                        "roll_sd_rad": math.radians(1), "height_sd_m": 0.5},
-     "70 tracks tell its pose (sure to 1.6° in tilt, 1.6° in roll, 0.8 m in height); somebody has "
-     "to agree to it"),
+     "pose estimated from 70 tracks (sure to 1.6° in tilt, 1.6° in roll, 0.8 m in height); an "
+     "operator has to confirm it"),
     (S.REFERENCE_TRACKS, {"counted": 40, "wanted": 60, "tracks": 40, "pieces": 0},
      "40 of 60 people for the reference"),
     (S.REFERENCE_TRACKS, {"counted": 98, "wanted": 133, "tracks": 133, "pieces": 35},

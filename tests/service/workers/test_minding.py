@@ -65,7 +65,7 @@ HANGS = """
 import threading
 import service.estimate_queue as queue
 
-queue.begin_look = lambda *_: threading.Event().wait()
+queue.start_run = lambda *_: threading.Event().wait()
 """
 
 

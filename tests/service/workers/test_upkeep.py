@@ -9,7 +9,7 @@ from sqlalchemy import event
 from models.geometry.pose import CameraPose
 from service.cameras.cameras import add_prior_pose
 from service.cameras.tracks import receive_tracks
-from service.estimate_queue import begin_look, end_look, request_estimate
+from service.estimate_queue import finish_run, request_estimate, start_run
 from service.formats.json_track import read_track
 from service.formats.track import Batch, Clock, Limits
 from service.store import cameras, tracks, trainings, windows
@@ -80,7 +80,7 @@ def put_tracks(session, count, *, step_s=0.4, start_s=None, first=0):
         session.connection(),
         Recorder(),
         "corner",
-        Batch(source=batch[0].source, tracks=tuple(batch), rejections=()),
+        Batch(source="t", tracks=tuple(batch), rejections=()),
         read_by=cameras.awaited(session.connection(), "corner").picture,
     )
 
@@ -109,7 +109,7 @@ def test_of_a_camera_that_needs_nothing_little_is_asked(session, queue, settings
     """Each of hundreds is asked of once a minute, by night too."""
     session.delete(trainings.unfinished(session, "corner")[0])
     put_tracks(session, 2)  # an hour ago: a silence, but not as long as the limit
-    end_look(session, "corner", tracks.newest_pk(session, "corner"), rest_s=0.0, failures=())
+    finish_run(session, "corner", tracks.newest_pk(session, "corner"), rest_s=0.0, failures=())
     session.flush()
     asked = []
     connection = session.connection()
@@ -141,14 +141,14 @@ def test_tracks_that_nothing_has_looked_at_are_looked_at(session, queue, setting
     assert found == ["tracks that nothing has looked at"]
     assert queue.estimates == ["corner"]
     assert reconciliation.reconcile_camera(session, queue, settings, "corner") == []
-    end_look(session, "corner", begin_look(session, "corner")[0])
+    finish_run(session, "corner", start_run(session, "corner")[0])
     assert reconciliation.reconcile_camera(session, queue, settings, "corner") == []
 
 
 def test_tracks_that_the_model_in_use_has_not_looked_at_are_looked_at(session, queue, settings):
     put_tracks(session, 5)
     publish(session, queue, settings)
-    end_look(session, "corner", begin_look(session, "corner")[0])  # by an older model, or none
+    finish_run(session, "corner", start_run(session, "corner")[0])  # by an older model, or none
     queue.estimates.clear()
     found = reconciliation.reconcile_camera(session, queue, settings, "corner")
     assert found == ["tracks that nothing has looked at"]

@@ -27,11 +27,11 @@ def act(http, chosen):
             (f"{alert}/acknowledge", {"acknowledged": chosen.random() < 0.5}),
             (f"{alert}/silence", {"until": until if chosen.random() < 0.5 else None}),
             (f"{alert}/resolve", {"outcome": "false_alarm"}),
-            (f"{alert}/resolve", {"outcome": "mended"}),
-            ("/acts", {"ids": _CAMERAS, "act": "put_back"}),
-            ("/acts", {"ids": _CAMERAS, "act": "undo"}),
-            ("/acts", {"ids": _CAMERAS, "act": "tag", "add": ["a"], "remove": ["b"]}),
-            ("/acts", {"ids": [each["id"] for each in firing] or ["none"], "act": "resolve",
+            (f"{alert}/resolve", {"outcome": "fixed"}),
+            ("/actions", {"ids": _CAMERAS, "action": "put_back"}),
+            ("/actions", {"ids": _CAMERAS, "action": "undo"}),
+            ("/actions", {"ids": _CAMERAS, "action": "tag", "add": ["a"], "remove": ["b"]}),
+            ("/actions", {"ids": [each["id"] for each in firing] or ["none"], "action": "resolve",
                        "outcome": "false_alarm"}),
         ]
     )  # fmt: skip

@@ -1,8 +1,8 @@
-"""What one look at a camera may read: of more, the largest tracks count and are not looked at.
+"""The budget of an estimation run; if the tracks exceed it, the largest ones are skipped.
 
-CPU and memory of a look grow with the rows that are made of its tracks, one for each node and
-another for its box or head, and with their points, which is known before any is read: 25,000 rows
-are up to 35 CPU-s of an estimate, 4 of a map, and 60 MB.
+CPU time and memory of a run grow with the number of points and of rows: one row for each node of a
+track, and another for its box or head. Both numbers are known before a track is read. 25,000 rows
+take up to 35 CPU seconds for an estimate, 4 for a map, and 60 MB.
 """
 
 from collections.abc import Sequence
@@ -26,10 +26,10 @@ class TrackSize(NamedTuple):
     stored_bytes: int
 
 
-class LookBudget:
-    """The budget of one look, or a `share` of it; `skipped` are the names of tracks by number.
+class RunBudget:
+    """The budget of a run, or a `share` of it; `skipped` has the ids of skipped tracks by number.
 
-    Each reading of tracks may spend all of it.
+    Each query of tracks may use all of it.
     """
 
     def __init__(self, share: float = 1.0) -> None:
@@ -37,7 +37,7 @@ class LookBudget:
         self.skipped: dict[int, str] = {}
 
     def leave_out(self, sizes: Sequence[TrackSize]) -> list[int]:
-        """The fewest tracks to be left out, the largest first, for the others to be in budget."""
+        """The fewest tracks to skip, largest first, so that the others fit the budget."""
         costs = [(_cost(size), size) for size in sizes]
         total = sum(cost for cost, _ in costs)
         found: list[int] = []

@@ -9,9 +9,9 @@ from sqlalchemy import update
 from models.effort import EffortExceededError
 from service.alerts.staleness import StaleWatch
 from service.estimate_queue import budget_of
-from service.store import look_budget, windows
+from service.store import run_budget, windows
 from service.store.cameras import CameraRecord
-from service.store.look_budget import LookBudget, TrackSize
+from service.store.run_budget import RunBudget, TrackSize
 from service.store.windows import WindowBounds
 from service.workers.estimate import run_estimate
 from tests.service.street import KNOCKED, known_street
@@ -61,15 +61,15 @@ def test_the_largest_are_skipped_and_no_more_of_them_than_need_be():
 
     honest = [size(n, 30.0) for n in range(400)]
     lingering = [size(500 + n, 3_000.0 + 2 * n) for n in range(9)]
-    budget = LookBudget()
+    budget = RunBudget()
     assert budget.leave_out(honest) == []
     assert budget.leave_out([*honest, *lingering]) == [508]
     assert budget.skipped == {n: f"t{n}" for n in (508,)}
     large = [size(1, 30.0, 10_000, 80_000_000), size(2, 30.0, 10_000, 40_000_000)]
-    assert LookBudget().leave_out(large) == [1]
-    assert LookBudget(0.25).leave_out(large) == [1, 2]
+    assert RunBudget().leave_out(large) == [1]
+    assert RunBudget(0.25).leave_out(large) == [1, 2]
     # Six points over a month are 34 nodes, however they got there.
-    assert LookBudget().leave_out([size(n, 30 * 86_400.0, 6, 144) for n in range(700)]) == []
+    assert RunBudget().leave_out([size(n, 30 * 86_400.0, 6, 144) for n in range(700)]) == []
 
 
 def test_of_what_is_left_out_the_last_point_is_read_and_it_counts(street):
@@ -77,7 +77,7 @@ def test_of_what_is_left_out_the_last_point_is_read_and_it_counts(street):
     bounds = WindowBounds(camera_id="corner", tracks=10, days=7.0)
     with street.context.store.read() as session:
         whole = windows.window(session, bounds)
-        some = windows.window(session, bounds, LookBudget(0.1))
+        some = windows.window(session, bounds, RunBudget(0.1))
     assert [record.id for record in some] == [record.id for record in whole]
     assert [len(record.points) // 24 for record in whole[-2:]] == [450, 450]
     cut = [record for record in some if len(record.points) == 24]
@@ -88,7 +88,7 @@ def test_of_what_is_left_out_the_last_point_is_read_and_it_counts(street):
 
 
 def test_a_camera_beside_whom_people_linger_sees_a_knock_and_names_them(street, monkeypatch):
-    monkeypatch.setattr(look_budget, "_MOST_ROWS", 6_000)
+    monkeypatch.setattr(run_budget, "_MOST_ROWS", 6_000)
     linger(street, 9)
     street.keep_to_lanes(KNOCKED, 40)
     body = street.look()
@@ -108,7 +108,7 @@ def test_a_camera_beside_whom_people_linger_sees_a_knock_and_names_them(street, 
     monkeypatch.undo()
     street.keep_to_lanes(KNOCKED, 5)
     street.look()
-    assert camera(street).lacks == ()
+    assert camera(street).missing_parts == ()
     assert watch(street) == {"corner": "ended"}
 
 
@@ -125,7 +125,7 @@ def test_a_look_that_takes_too_long_ends_and_the_next_ones_leave_more_out(street
         spoil(street, estimate_after=None)
     street.go_on(street.http, context.settings)
     assert street.look()["drift"]["tilt_deg"] == pytest.approx(5.0, abs=1.5)
-    (lack,) = camera(street).lacks
+    (lack,) = camera(street).missing_parts
     assert lack.values["share"] == 0.0625
     assert lack.values["tracks"] >= 8
     assert budget(street).share == 0.0625  # as long as they are there

@@ -17,7 +17,7 @@ export async function done(words, what) {
   return answer ?? null;
 }
 
-export const ALERT_ACTS = {
+export const ALERT_ACTIONS = {
   answer({ alert, outcome, done: word }) {
     const note = document.getElementById(`note-${alert}`)?.value.trim();
     const body = { outcome, ...(note && { note }) };
@@ -65,19 +65,19 @@ export function planMaintenance(send) {
 const DOUBLE_MS = 800;
 const NEAR_PX = 40;
 
-/** Do by a click on a button with data-act what it names, and say what is refused. */
+/** Do by a click on a button with data-action what it names, and say what is refused. */
 export function listen(root, acts) {
   let last = { at: -DOUBLE_MS };
   root.addEventListener("renewed", () => (last = { ...last, at: performance.now() }));
   root.addEventListener("click", (event) => {
-    const button = event.target.closest("button[data-act]");
-    if (!button || !acts[button.dataset.act]) return;
+    const button = event.target.closest("button[data-action]");
+    if (!button || !acts[button.dataset.action]) return;
     // A row that was answered goes, and the next one's button lies under the pointer: a second click
     // at one place is no answer to another alert.
     const { clientX: x, clientY: y, detail } = event;
     const again = performance.now() - last.at < DOUBLE_MS && Math.hypot(x - last.x, y - last.y) < NEAR_PX;
     if (detail && again && button.dataset.alert !== last.alert) return;
     last = { at: performance.now(), x, y, alert: button.dataset.alert };
-    guarded(button, () => acts[button.dataset.act]({ ...button.dataset }, button));
+    guarded(button, () => acts[button.dataset.action]({ ...button.dataset }, button));
   });
 }

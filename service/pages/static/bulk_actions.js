@@ -1,8 +1,8 @@
-// One act with one alert or many, or with cameras: POST /acts has an answer for each, and says until
+// One act with one alert or many, or with cameras: POST /actions has an answer for each, and says until
 // when it can be undone. What is offered for what is chosen is the service's rule (pages/bulk.py).
 
 import { Refused, announce, call, guarded, plainly } from "./act.js";
-import { planMaintenance, silenceOf } from "./alert_acts.js";
+import { planMaintenance, silenceOf } from "./alert_actions.js";
 import { ask, signed, wordsIn } from "./dialogs.js";
 import { _, _n } from "./words.js";
 
@@ -37,7 +37,7 @@ export function offer(bulk, items, noun) {
   document.getElementById("mixed").textContent = lost || !answers ? mixture(items, lost) : "";
 }
 
-const takes = (kinds, act) => kinds.split(" ").some((kind) => RULE.kinds[kind].takes.includes(act));
+const takes = (kinds, action) => kinds.split(" ").some((kind) => RULE.kinds[kind].takes.includes(action));
 
 /**
  * "Not every answer fits all: 2 of 5 are clock faults (Gate 1, Gate 2)." All but the most of a kind are told,
@@ -66,18 +66,18 @@ const counted = (n, noun) =>
 // --- What is done --------------------------------------------------------------------------------
 
 /** Do an act with all that are chosen: items with a `camera`, an `alert` or both, and a `name`. */
-export async function withMany({ bulk: act, takes: wanted }, chosen, after) {
-  const items = act === "acknowledge" ? chosen.filter(({ waiting }) => Number(waiting)) : chosen;
-  const outcome = act === "resolve" ? { outcome: wanted } : {};
+export async function withMany({ bulk: action, takes: wanted }, chosen, after) {
+  const items = action === "acknowledge" ? chosen.filter(({ waiting }) => Number(waiting)) : chosen;
+  const outcome = action === "resolve" ? { outcome: wanted } : {};
   const send = async (more) => {
-    const targets = OF_ALERTS.includes(act) ? await alertsOf(items, wanted) : items.map((item) => [item.camera, item]);
-    const done = await actOn(act, targets, items, { ...outcome, ...more });
+    const targets = OF_ALERTS.includes(action) ? await alertsOf(items, wanted) : items.map((item) => [item.camera, item]);
+    const done = await actOn(action, targets, items, { ...outcome, ...more });
     if (done !== undefined) after();
     return done;
   };
-  if (act === "silence") return ask("silence-dialog", { send: (said) => send(silenceOf(said)) });
-  if (act === "maintenance") return planMaintenance(send);
-  if (act === "tag") return ask("tag-dialog", { send: (said) => send(tagsOf(said)) });
+  if (action === "silence") return ask("silence-dialog", { send: (said) => send(silenceOf(said)) });
+  if (action === "maintenance") return planMaintenance(send);
+  if (action === "tag") return ask("tag-dialog", { send: (said) => send(tagsOf(said)) });
   return send();
 }
 
@@ -88,22 +88,22 @@ export function answer({ alert, outcome, name }) {
 }
 
 /** Do an act with ids, each of an item, and say how many items it was done with. */
-async function actOn(act, targets, items, more = {}) {
+async function actOn(action, targets, items, more = {}) {
   const ids = [...new Set(targets.map(([id]) => id))];
   const problems = new Map();
   let undo = null;
   for (let at = 0; at < ids.length; at += AT_ONCE) {
-    const told = await signed("POST", "/acts", { ids: ids.slice(at, at + AT_ONCE), act, ...more });
+    const told = await signed("POST", "/actions", { ids: ids.slice(at, at + AT_ONCE), action, ...more });
     if (told === undefined) return undefined;
     for (const { id, problem } of told.items) problems.set(id, problem);
-    if (act === "acknowledge" && more.acknowledged !== false) undo = givenBack(told.items, undo);
+    if (action === "acknowledge" && more.acknowledged !== false) undo = givenBack(told.items, undo);
     if (told.undo) undo = { ids: [...(undo?.ids ?? []), ...told.undo.ids], until: undo?.until ?? told.undo.until };
   }
   const refused = new Map(items.map((item) => [item, ANSWERED])); // unless something of it was still open
   for (const [, item] of targets) refused.delete(item);
   for (const [id, item] of targets) if (problems.get(id)) refused.set(item, problems.get(id));
   if (items.length === 1 && refused.size) throw new Refused(refused.get(items[0]));
-  sayDone(RULE.done[more.acknowledged === false ? "undo" : (more.outcome ?? act)], items, refused, undo);
+  sayDone(RULE.done[more.acknowledged === false ? "undo" : (more.outcome ?? action)], items, refused, undo);
   document.dispatchEvent(new CustomEvent("acted"));
   return items;
 }
@@ -159,11 +159,11 @@ function offerUndo(words, undo) {
   announce("");
   const said = document.createElement("span");
   said.textContent = words;
-  const [act, more] = undo.by ?? ["undo", {}];
+  const [action, more] = undo.by ?? ["undo", {}];
   const items = undo.ids.map((id) => (undo.by ? { alert: id } : { camera: id }));
   const back = async () => {
     for (const id of undo.ids) undone.set(id, Date.now() + QUIET_MS); // events may come before the answer
-    await actOn(act, items.map((item, at) => [undo.ids[at], item]), items, more);
+    await actOn(action, items.map((item, at) => [undo.ids[at], item]), items, more);
   };
   place.replaceChildren(said, buttonOf(_("Undo"), "", back), buttonOf("×", _("Close"), close));
   over = setTimeout(close, Date.parse(undo.until) - Date.now());
@@ -185,7 +185,7 @@ function tagsOf({ add, remove }) {
   throw new Refused({ errors: [{ pointer: "/add", reason: _("a word is needed, here or below") }] });
 }
 
-/** The open alerts that take an act, each with the item that it is, or whose camera it is about. */
+/** The open alerts that take an action, each with the item that it is, or whose camera it is about. */
 async function alertsOf(items, wanted) {
   if (items[0].alert) return items.map((item) => [item.alert, item]);
   const of = new Map(items.map((item) => [item.camera, item]));

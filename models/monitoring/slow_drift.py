@@ -1,23 +1,22 @@
-"""Creep: a turn too slow for any window, detected by the scores of each day against the first map.
+"""Slow drift: a turn too slow for any window, detected from the daily scores against the first map.
 
-A map that grows takes a slow turn along with it, and no window of some days is long enough to see
-it. So the first chart of a site, with the map and the speeds of its reference, stays, and each day
-of people is held against it once. From those of weeks in a row comes the largest standard score of
-any turn that grew evenly from some week on, or from the reference on, or that has been the same
-ever since: a generalised likelihood ratio test for a ramp, with three things in its noise that no
-number of people makes smaller. The reference is of few people, and wrong by the same on all days.
-Habits change where people walk and how fast, by the season (slowly) and by the day. Height and pace
-are such habits: no camera is said to sink.
+A map that grows follows a slow turn, and no window of some days is long enough to detect it. The
+first chart of a site is therefore kept, with the map and the speeds of its reference, and each day
+of tracks is scored against it once. From the weeks so far, the test takes the largest standard
+score of any turn that grows evenly from some week or from the reference on, or that is constant
+since the reference: a generalised likelihood ratio test for a ramp. Three parts of its noise do not
+shrink with the number of people. The reference has few people, and the same error on all days.
+Habits change where people walk and how fast, slowly by season and from day to day. Height and
+walking speed are such habits, so a camera that sinks is not reported.
 
-What is kept of a day is its people's pull on tilt, roll, log height, heading and the log of times:
-their scores, weighed by how each of these would change them (the sufficient statistic of a small
-move, if scores scatter alike every day).
+A day is stored as the sum of its people's scores for tilt, roll, log height, heading and the log of
+times, weighted by how each person's tracks would change them (the sufficient statistic of a small
+move, if scores have the same spread every day).
 
-It is an alarm of its own, with a share of its own in the false ones that are allowed; whatever
-grows or slides elsewhere moves nothing of it. Only a new reference does.
+The test has its own share of the allowed false alarms. Only a new reference restarts it.
 
 Source: Basseville and Nikiforov, "Detection of Abrupt Changes" (1993), section 7.2.4 for the ratio
-test with an unknown start; the ramp in the place of a jump is ours.
+test with an unknown start; the ramp in place of a jump is ours.
 """
 
 from dataclasses import dataclass, replace
@@ -36,7 +35,7 @@ NUMBERS = 5  # tilt, roll, log height, heading, log of times
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CreepLog:
+class SlowDriftLog:
     """Sums of the scores of days (D,) of people, against the first map and speeds of a reference.
 
     `day_idx` counts days from the epoch, `groups` are how many came, `pulls` (D, 5) what they
@@ -52,10 +51,10 @@ class CreepLog:
     since_day: float
 
 
-def begin_log(chart: DriftChart, to_s: float) -> CreepLog:
+def begin_log(chart: DriftChart, to_s: float) -> SlowDriftLog:
     """The log of a chart whose last people came at a time, without a day."""
     slopes = _slopes(chart)
-    return CreepLog(
+    return SlowDriftLog(
         day_idx=np.zeros(0, dtype=np.int64),
         groups=np.zeros(0),
         pulls=np.zeros((0, NUMBERS)),
@@ -65,7 +64,7 @@ def begin_log(chart: DriftChart, to_s: float) -> CreepLog:
     )
 
 
-def add_day(log: CreepLog, chart: DriftChart, day: int, scores: GroupScores) -> CreepLog:
+def add_day(log: SlowDriftLog, chart: DriftChart, day: int, scores: GroupScores) -> SlowDriftLog:
     """The log with a day that it does not know yet, and what its groups say of it.
 
     Scores are by the first map and speeds of the site.
@@ -93,7 +92,7 @@ class Weeks:
     last_day: float
 
 
-def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
+def weeks_of(log: SlowDriftLog, from_s: float | None) -> Weeks | None:
     """The newest weeks since a time, the newest first; None of too few people."""
     from_day = -np.inf if from_s is None else np.ceil(from_s / DAY_S)
     kept = (log.day_idx >= from_day) & (log.groups > 0)
@@ -118,7 +117,7 @@ def weeks_of(log: CreepLog, from_s: float | None) -> Weeks | None:
     )
 
 
-def noise_of(log: CreepLog, weeks: Weeks) -> Array:
+def noise_of(log: SlowDriftLog, weeks: Weeks) -> Array:
     """The covariance (5 B, 5 B) of the weeks' mean moves if the camera stands."""
     person = np.linalg.inv(_group_information(log))
     apart = np.abs(weeks.middle_day[:, None] - weeks.middle_day)
@@ -127,7 +126,7 @@ def noise_of(log: CreepLog, weeks: Weeks) -> Array:
     return np.asarray(np.kron(people, person) + np.kron(habits, np.diag(config.HABITS_OF_DAYS**2)))
 
 
-def _group_information(log: CreepLog) -> Array:
+def _group_information(log: SlowDriftLog) -> Array:
     """Information of a group (5, 5), none of it so small that it cannot be inverted."""
     return np.asarray(log.information + np.eye(NUMBERS) / config.FREE_RAD**2)
 
@@ -137,12 +136,12 @@ def _slopes(chart: DriftChart) -> Array:
     return np.stack([slope_of(chart, number) for number in range(NUMBERS)], axis=1)
 
 
-ANGLES = (0, 1, 3)  # tilt, roll and heading creep
+ANGLES = (0, 1, 3)  # only tilt, roll and heading drift slowly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Creep(TestStatistic):
-    """Most likely creep of a camera: its turn by now.
+class SlowDrift(TestStatistic):
+    """Most likely slow drift of a camera: its turn so far.
 
     `statistic` is compared with `level`. `parameter` is 0 for tilt, 1 for roll, 3 for heading, `by`
     how far it has gone (radians) with the standard deviation `sd`, since the day `since_day`.
@@ -154,20 +153,22 @@ class Creep(TestStatistic):
     since_day: float
 
 
-def creep_result(log: CreepLog, alarms_a_year: float, from_s: float | None = None) -> Creep | None:
-    """Most likely creep by a log's newest weeks; None of too few people, or days.
+def slow_drift_result(
+    log: SlowDriftLog, alarms_a_year: float, from_s: float | None = None
+) -> SlowDrift | None:
+    """Most likely slow drift from a log's newest weeks; None if it has too few people or days.
 
-    `alarms_a_year` are allowed of the creep alone. Since `from_s` the camera has stood as it does,
-    but for a creep; whole days count.
+    `alarms_a_year` are allowed for slow drift alone. Since `from_s` the camera has moved only by
+    slow drift; only whole days count.
     """
     scores = ramp_scores(log, from_s)
     if scores is None or not scores.information.all():
         return None  # the afternoon of the reference's own day is all there is: no ramp has begun
-    chance = min(alarms_a_year / config.CREEP_TESTS, 0.5) / 2
+    chance = min(alarms_a_year / config.SLOW_DRIFT_TESTS, 0.5) / 2
     level = value_below(chance, max(log.reference_groups - 1, 1.0)) ** 2
     statistics = scores.score**2 / scores.information
     row, way = np.unravel_index(int(statistics.argmax()), statistics.shape)
-    return Creep(
+    return SlowDrift(
         statistic=float(statistics[row, way]),
         level=level,
         parameter=ANGLES[int(row)],
@@ -207,7 +208,7 @@ class RampScores:
     information: Array
 
 
-def ramp_scores(log: CreepLog, from_s: float | None) -> RampScores | None:
+def ramp_scores(log: SlowDriftLog, from_s: float | None) -> RampScores | None:
     """Scores of a log's weeks along every ramp; None of too few people."""
     weeks = weeks_of(log, from_s)
     if weeks is None:
@@ -229,13 +230,13 @@ def ramp_scores(log: CreepLog, from_s: float | None) -> RampScores | None:
     )
 
 
-def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None) -> Array:
+def posterior_mean_turns(log: SlowDriftLog, days: Array, from_s: float | None = None) -> Array:
     """Posterior mean (N, 4) of a camera's turn in tilt, roll, log height, heading by days (N,).
 
-    The log is that of a camera that stands, or of one that creeps along one of the ramps, by half a
-    degree a month, more or less: each weighs by its marginal likelihood and by how rare creeps are.
-    So the tracks of a camera that stands are left as they are, and not bent to the noise of its
-    first map. 0 where the log is of too few people. `from_s` as for a creep.
+    The camera is stationary, or drifts along one of the ramps by about half a degree a month. Each
+    case is weighted by its marginal likelihood and by the share of cameras that drift slowly.
+    Tracks of a stationary camera are therefore not bent to the noise of its first map. 0 if the
+    log has too few people. `from_s` as in `slow_drift_result`.
 
     Source: Bayesian model averaging; the ratio of the marginal likelihoods of a Gaussian's mean.
     """
@@ -243,13 +244,13 @@ def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None
     scores = ramp_scores(log, from_s)
     if scores is None:
         return turns
-    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / config.CREEP_DAYS
-    usual = (config.CREEP_RAD * months) ** 2
+    months = np.maximum(scores.ramps.now - scores.ramps.starts, 1.0) / config.SLOW_DRIFT_DAYS
+    usual = (config.SLOW_DRIFT_RAD * months) ** 2
     size = usual * scores.score / (1 + usual * scores.information)
     ratio = 0.5 * (size * scores.score - np.log1p(usual * scores.information))
     odds = (
-        config.CREEPING_SHARE
-        / (1 - config.CREEPING_SHARE)
+        config.SLOW_DRIFT_PRIOR
+        / (1 - config.SLOW_DRIFT_PRIOR)
         / ratio.size
         * np.exp(np.clip(ratio, -50.0, 50.0))
     )
@@ -258,18 +259,18 @@ def posterior_mean_turns(log: CreepLog, days: Array, from_s: float | None = None
     return turns
 
 
-_CREEP_LOG = Format(name="creep", version=1)
+_SLOW_DRIFT_LOG = Format(name="creep", version=1)
 
 
-def creep_log_to_bytes(log: CreepLog) -> bytes:
+def slow_drift_log_to_bytes(log: SlowDriftLog) -> bytes:
     """A log as it is stored."""
-    return to_bytes(_CREEP_LOG, flattened(log))
+    return to_bytes(_SLOW_DRIFT_LOG, flattened(log))
 
 
-def creep_log_from_bytes(data: bytes) -> CreepLog:
-    """The log of `creep_log_to_bytes`.
+def slow_drift_log_from_bytes(data: bytes) -> SlowDriftLog:
+    """The log of `slow_drift_log_to_bytes`.
 
     Raises:
         CheckpointError: the bytes are no log of this format.
     """
-    return restored(CreepLog, from_bytes(_CREEP_LOG, data))
+    return restored(SlowDriftLog, from_bytes(_SLOW_DRIFT_LOG, data))

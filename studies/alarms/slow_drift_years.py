@@ -8,11 +8,11 @@ from typing import Self
 
 import numpy as np
 
-from models.assessment import begin_creep_log, log_creep
+from models.assessment import begin_slow_drift_log, log_slow_drift
 from models.durations import DAY_S
 from models.geometry.pose import CameraPose
-from models.monitoring.config import CREEP_SHARE
-from models.monitoring.creep import Creep, creep_result
+from models.monitoring.config import SLOW_DRIFT_SHARE
+from models.monitoring.slow_drift import SlowDrift, slow_drift_result
 from models.pose import CameraSite, learn_site
 from models.simulation.poses import PoseOffset
 from models.tracks.trajectory import Trajectory
@@ -32,7 +32,7 @@ _EVERY_DAYS = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CreepPlan:
+class SlowDriftPlan:
     """Plan of creeping years: traffic, people of the references, and the alarms allowed.
 
     For how many days they creep at the most, and stand.
@@ -46,7 +46,7 @@ class CreepPlan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CreepCase:
+class SlowDriftCase:
     """A camera that crept by `rate_deg` a month in a number, or stood, for some `days`.
 
     `told_deg` is how far it had gone when that was detected, after so many `days`; `said_deg`
@@ -77,7 +77,7 @@ class CreepCase:
 class Life:
     """A camera's site, its first reference, and the people of one day after the other."""
 
-    def __init__(self, site: int, seed: int, plan: CreepPlan) -> None:
+    def __init__(self, site: int, seed: int, plan: SlowDriftPlan) -> None:
         rng = np.random.default_rng([seed, site, 11])
         self.simulated: SimulatedSite = draw_simulated_site(rng)
         self.site, self.seed, self.plan = site, seed, plan
@@ -118,7 +118,7 @@ class Life:
         return next(days)
 
 
-def creep_cases(site: int, seed: int, plan: CreepPlan) -> list[CreepCase]:
+def slow_drift_cases(site: int, seed: int, plan: SlowDriftPlan) -> list[SlowDriftCase]:
     """One simulated camera that creeps in each number at each rate, and one that stands.
 
     The same site and seed give the same people before each of them.
@@ -128,23 +128,25 @@ def creep_cases(site: int, seed: int, plan: CreepPlan) -> list[CreepCase]:
     """
     life = Life(site, seed, plan)
     kinds = [(number, rate_deg) for number in NUMBERS for rate_deg in RATES_DEG]
-    cases = [creep_case(life.again(), number, rate_deg, plan.days) for number, rate_deg in kinds]
+    cases = [
+        slow_drift_case(life.again(), number, rate_deg, plan.days) for number, rate_deg in kinds
+    ]
     if plan.still_days:
-        cases.append(creep_case(life.again(), "tilt", 0.0, plan.still_days))
+        cases.append(slow_drift_case(life.again(), "tilt", 0.0, plan.still_days))
     return cases
 
 
-def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> CreepCase:
+def slow_drift_case(life: Life, number: str, rate_deg: float, most_days: int) -> SlowDriftCase:
     """A camera that creeps, or stands, looked at every third day; until the first alarm of a creep.
 
     Raises:
         DegenerateGeometryError: nobody is seen any more.
     """
-    log = begin_creep_log(life.first, life.to_s)
+    log = begin_slow_drift_log(life.first, life.to_s)
     assert log is not None
     alarms, highest = 0, 0.0
     from_s: float | None = None
-    first: Creep | None = None
+    first: SlowDrift | None = None
     told_deg: float | None = None
     tracks: list[Trajectory] = []
     days = 0
@@ -155,11 +157,11 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
         tracks += life.next_day(turned(life.simulated.prior, number, turned_deg))
         if days % _EVERY_DAYS or not tracks:
             continue
-        log = log_creep(
+        log = log_slow_drift(
             log, observe_feet(tracks, life.simulated.intrinsics, life.simulated.prior), life.first
         )
         tracks = []
-        found = creep_result(log, CREEP_SHARE * life.plan.alarms_a_year, from_s)
+        found = slow_drift_result(log, SLOW_DRIFT_SHARE * life.plan.alarms_a_year, from_s)
         if found is None:
             continue
         highest = max(highest, found.excess)
@@ -169,7 +171,7 @@ def creep_case(life: Life, number: str, rate_deg: float, most_days: int) -> Cree
                 first, told_deg = found, turned_deg
             if rate_deg:
                 break
-    return CreepCase(
+    return SlowDriftCase(
         site=life.site,
         seed=life.seed,
         number=number,

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from service.enums import Act, AlertKind, Answer
+from service.enums import Action, AlertKind, Answer
 from service.store.alerts import MEMBER
 from service.wording.language import N_
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ActWords:
+class ActionWords:
     """An act on a button for `one` and `many`, before what it was `done` with, and its sense."""
 
     one: str
@@ -17,62 +17,62 @@ class ActWords:
     means: str
 
 
-ACTS: dict[Answer | Act, ActWords] = {
-    Answer.PUT_BACK: ActWords(
+ACTIONS: dict[Answer | Action, ActionWords] = {
+    Answer.PUT_BACK: ActionWords(
         one=N_("It was put back"),
         many=N_("They were put back"),
         done=N_("Put back"),
         means=N_("The camera is back in its original position. The learned reference is kept."),
     ),
-    Answer.ACCEPTED: ActWords(
+    Answer.ACCEPTED: ActionWords(
         one=N_("Keep the new aim"),
         many=N_("Keep the new aims"),
         done=N_("New aim kept"),
         means=N_("The current position becomes the reference and is relearned."),
     ),
-    Answer.MENDED: ActWords(
-        one=N_("It was put right"),
-        many=N_("They were put right"),
-        done=N_("Put right"),
-        means=N_("Clock, tracker or view is correct again. Monitoring continues."),
+    Answer.FIXED: ActionWords(
+        one=N_("Fixed"),
+        many=N_("Fixed"),
+        done=N_("Fixed"),
+        means=N_("The fault in clock, tracker or view is fixed. Monitoring continues."),
     ),
-    Answer.FALSE_ALARM: ActWords(
+    Answer.FALSE_ALARM: ActionWords(
         one=N_("False alarm"),
         many=N_("False alarms"),
         done=N_("False alarm"),
         means=N_("Nothing was wrong. Monitoring continues."),
     ),
-    Act.ACKNOWLEDGE: ActWords(
+    Action.ACKNOWLEDGE: ActionWords(
         one=N_("Acknowledge"),
         many=N_("Acknowledge"),
         done=N_("Acknowledged"),
         means=N_("Shows others that you are working on the alert. It stays open."),
     ),
-    Act.SILENCE: ActWords(
+    Action.SILENCE: ActionWords(
         one=N_("Silence…"),
         many=N_("Silence…"),
         done=N_("Silenced"),
         means=N_("No notifications about the alert for a time that you choose. It stays open."),
     ),
-    Act.MAINTENANCE: ActWords(
+    Action.MAINTENANCE: ActionWords(
         one=N_("Plan maintenance…"),
         many=N_("Plan maintenance…"),
         done=N_("Maintenance planned"),
         means=N_("While people work on the camera, nothing is estimated or learned."),
     ),
-    Act.RESET: ActWords(
+    Action.RESET: ActionWords(
         one=N_("Learn anew at the old aim"),
         many=N_("Learn anew at the old aims"),
         done=N_("Being learned anew"),
         means=N_("The camera has not moved, but people walk differently now: learn it again."),
     ),
-    Act.TAG: ActWords(
+    Action.TAG: ActionWords(
         one=N_("Tag…"),
         many=N_("Tag…"),
         done=N_("Tagged"),
         means=N_("A location, such as campus/north/gate, and search words, such as outdoor."),
     ),
-    Act.UNDO: ActWords(
+    Action.UNDO: ActionWords(
         one=N_("Undo"),
         many=N_("Undo"),
         done=N_("Undone"),

@@ -12,15 +12,15 @@ from rich.console import Console
 from rich.table import Table
 
 from models.errors import DegenerateGeometryError
-from studies.alarms.creep_years import NUMBERS, CreepCase, CreepPlan, creep_cases
+from studies.alarms.slow_drift_years import NUMBERS, SlowDriftCase, SlowDriftPlan, slow_drift_cases
 from studies.code_hash import code_hash
 from studies.runs import process_pool, with_bar, write_results
 
 _TABLE_WIDTH = 120
 
 
-def run_creep_study(
-    *, sites: int, seed: int, plan: CreepPlan, processes: int, output: Path
+def run_slow_drift_study(
+    *, sites: int, seed: int, plan: SlowDriftPlan, processes: int, output: Path
 ) -> None:
     """Let simulated cameras creep in each number at each rate, and stand; print, write JSON.
 
@@ -41,14 +41,14 @@ def run_creep_study(
             results = [asdict(each) for each in found]
             write_results(output, code=code_hash(), plan=asdict(plan), results=results)
     if found:
-        console.print(creep_table([case for case in found if not case.still]))
+        console.print(slow_drift_table([case for case in found if not case.still]))
         console.print(_still_words([case for case in found if case.still]))
     if without:
         console.print(f"{without} sites see too few people for an anchor")
     console.print(f"{output} has every case; {time.monotonic() - started:.0f} s in all")
 
 
-def creep_table(cases: Sequence[CreepCase]) -> Table:
+def slow_drift_table(cases: Sequence[SlowDriftCase]) -> Table:
     """Table of cameras' turns when their creep was detected, by number and rate."""
     table = Table(title="turned by so many deg when it was told: median, 90 %, worst; bar 1.5, 2.5")
     for name in ("deg a month", *NUMBERS):
@@ -69,7 +69,7 @@ def creep_table(cases: Sequence[CreepCase]) -> Table:
     return table
 
 
-def _still_words(cases: Sequence[CreepCase]) -> str:
+def _still_words(cases: Sequence[SlowDriftCase]) -> str:
     years = sum(case.days for case in cases) / 365.25
     alarms = sum(case.alarms for case in cases)
     alarmed = sum(case.alarms > 0 for case in cases)
@@ -78,17 +78,17 @@ def _still_words(cases: Sequence[CreepCase]) -> str:
     )
 
 
-def _kept(output: Path, plan: CreepPlan) -> list[CreepCase]:
+def _kept(output: Path, plan: SlowDriftPlan) -> list[SlowDriftCase]:
     if not output.exists():
         return []
     kept = json.loads(output.read_text())
     if (kept.get("code"), kept["plan"]) != (code_hash(), asdict(plan)):
         return []
-    return [CreepCase(**each) for each in kept["results"]]
+    return [SlowDriftCase(**each) for each in kept["results"]]
 
 
-def _live(site: int, seed: int, plan: CreepPlan) -> list[CreepCase]:
+def _live(site: int, seed: int, plan: SlowDriftPlan) -> list[SlowDriftCase]:
     try:
-        return creep_cases(site, seed, plan)
+        return slow_drift_cases(site, seed, plan)
     except DegenerateGeometryError:
         return []

@@ -1,4 +1,4 @@
-"""The creep: what weeks say against the first map, of logs drawn as their own noise would."""
+"""Slow drift: logs with simulated noise, tested against the first map."""
 
 import math
 from dataclasses import replace
@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from models.assessment import begin_creep_log, log_creep, without_creep
+from models.assessment import begin_slow_drift_log, log_slow_drift, without_slow_drift
 from models.errors import CheckpointError
-from models.monitoring.creep import (
+from models.monitoring.group_scores import score_groups
+from models.monitoring.slow_drift import (
     DAY_S,
     NUMBERS,
-    CreepLog,
+    SlowDriftLog,
     add_day,
     begin_log,
-    creep_log_from_bytes,
-    creep_log_to_bytes,
-    creep_result,
     noise_of,
     posterior_mean_turns,
+    slow_drift_log_from_bytes,
+    slow_drift_log_to_bytes,
+    slow_drift_result,
     weeks_of,
 )
-from models.monitoring.group_scores import score_groups
 from models.pose import learn_site, observe
 from models.serialization import flattened
 from models.simulation.poses import PoseOffset, offset_trajectory
@@ -35,7 +35,7 @@ A_YEAR = 0.1
 
 
 def blank(days, groups=18.0, reference=200.0):
-    return CreepLog(
+    return SlowDriftLog(
         day_idx=np.arange(20_000, 20_000 + days),
         groups=np.full(days, groups),
         pulls=np.zeros((days, NUMBERS)),
@@ -70,55 +70,55 @@ def ramp(log, number, deg_a_month):
 @pytest.mark.parametrize("deg_a_month", [0.5, -1.0])
 def test_a_ramp_is_told_with_its_number_way_and_size(number, deg_a_month):
     log = blank(int(2.5 / abs(deg_a_month) * MONTH_DAYS))
-    creep = creep_result(with_moves(log, ramp(log, number, deg_a_month)), A_YEAR)
-    assert creep.moved
-    assert creep.parameter == number
-    assert math.degrees(creep.by) == pytest.approx(math.copysign(2.5, deg_a_month), rel=0.1)
-    assert creep.since_day == pytest.approx(log.since_day, abs=40)
+    drift = slow_drift_result(with_moves(log, ramp(log, number, deg_a_month)), A_YEAR)
+    assert drift.moved
+    assert drift.parameter == number
+    assert math.degrees(drift.by) == pytest.approx(math.copysign(2.5, deg_a_month), rel=0.1)
+    assert drift.since_day == pytest.approx(log.since_day, abs=40)
 
 
 def test_a_late_ramp_is_said_to_have_begun_late():
     log = blank(200)
     late = replace(log, since_day=20_140.0)
     turned = np.where(log.day_idx[:, None] >= 20_140, ramp(late, 3, 1.0), 0.0)
-    creep = creep_result(with_moves(log, turned), A_YEAR)
-    assert creep.moved
-    assert creep.since_day == pytest.approx(20_140, abs=15)
+    drift = slow_drift_result(with_moves(log, turned), A_YEAR)
+    assert drift.moved
+    assert drift.since_day == pytest.approx(20_140, abs=15)
 
 
-def test_still_cameras_are_called_creeping_as_rarely_as_is_allowed():
+def test_stationary_cameras_have_no_more_false_alarms_than_allowed():
     rng = np.random.default_rng(5)
     logs = [drawn(blank(180), rng) for _ in range(200)]
-    told = sum(creep_result(log, A_YEAR).moved for log in logs)
+    told = sum(slow_drift_result(log, A_YEAR).moved for log in logs)
     assert told <= 8  # one look at each, half a year in: 4 % at the most, were all looks one
-    often = sum(creep_result(log, 100.0).moved for log in logs)
+    often = sum(slow_drift_result(log, 100.0).moved for log in logs)
     assert often > 60
 
 
-def test_neither_height_nor_pace_creeps():
+def test_height_and_speed_are_not_reported_as_slow_drift():
     log = blank(150)
     for number in (2, 4):
         turned = np.zeros((150, NUMBERS))
         turned[:, number] = np.linspace(0, 0.1, 150)
-        assert not creep_result(with_moves(log, turned), A_YEAR).moved
+        assert not slow_drift_result(with_moves(log, turned), A_YEAR).moved
 
 
 def test_few_people_say_nothing_and_only_whole_days_since_a_time_count():
     log = blank(60)
-    assert creep_result(blank(3), A_YEAR) is None
+    assert slow_drift_result(blank(3), A_YEAR) is None
     turned = ramp(log, 0, 3.0)
-    assert creep_result(with_moves(log, turned), A_YEAR).moved
+    assert slow_drift_result(with_moves(log, turned), A_YEAR).moved
     from_s = (20_000 + 57) * DAY_S
-    assert creep_result(with_moves(log, turned), A_YEAR, from_s) is None
+    assert slow_drift_result(with_moves(log, turned), A_YEAR, from_s) is None
     assert weeks_of(log, from_s - 30 * DAY_S + 1).groups.sum() == 18 * 32
 
 
-def test_the_afternoon_of_the_references_own_day_tells_of_no_creep():
+def test_rest_of_the_reference_day_is_no_slow_drift():
     """It ended at 18:00 of a day whose middle is noon: the ramp's turn was 0 / 0, and kept so."""
     afternoon = replace(blank(1, groups=400.0), since_day=20_000.75)
-    assert creep_result(afternoon, A_YEAR) is None
+    assert slow_drift_result(afternoon, A_YEAR) is None
     assert np.isfinite(posterior_mean_turns(afternoon, np.array([20_000.5]))).all()
-    result = creep_result(replace(blank(2, groups=400.0), since_day=20_000.75), A_YEAR)
+    result = slow_drift_result(replace(blank(2, groups=400.0), since_day=20_000.75), A_YEAR)
     assert result.statistic == 0
     assert math.isfinite(result.sd)
 
@@ -150,12 +150,12 @@ def first():
 
 def test_a_log_is_the_same_however_its_days_came(first):
     site, known, later = first
-    whole = log_creep(begin_creep_log(site, 0.0), observe(later, LENS, PRIOR), site)
-    parts = begin_creep_log(site, 0.0)
+    whole = log_slow_drift(begin_slow_drift_log(site, 0.0), observe(later, LENS, PRIOR), site)
+    parts = begin_slow_drift_log(site, 0.0)
     for day in whole.day_idx:
         tracks = [track for track in later if track.time_s[-1] // DAY_S == day]
         for _ in range(2):  # by a job that runs twice, too
-            parts = log_creep(parts, observe(tracks, LENS, PRIOR), site)
+            parts = log_slow_drift(parts, observe(tracks, LENS, PRIOR), site)
     for name, value in flattened(whole).items():
         assert_allclose(flattened(parts)[name], value, rtol=1e-6, atol=1e-6)
 
@@ -168,10 +168,12 @@ def test_a_turned_camera_pulls_its_log_that_way(first):
         ).apply(PRIOR)
         seen = [offset_trajectory(track, LENS, PRIOR, knocked) for track in later]
         seen = [track for track in seen if track is not None and track.long_enough]
-        log = log_creep(begin_creep_log(site, 0.0), observe(by_end(seen), LENS, PRIOR), site)
+        log = log_slow_drift(
+            begin_slow_drift_log(site, 0.0), observe(by_end(seen), LENS, PRIOR), site
+        )
         pull = log.pulls.sum(axis=0) * np.sqrt(np.diag(np.linalg.inv(log.information)))
         assert pull[number] > 0
-        without = log_creep(begin_creep_log(site, 0.0), observe(later, LENS, PRIOR), site)
+        without = log_slow_drift(begin_slow_drift_log(site, 0.0), observe(later, LENS, PRIOR), site)
         assert pull[number] > 3 * abs(without.pulls.sum(axis=0)[number]) * math.sqrt(
             np.linalg.inv(log.information)[number, number]
         )
@@ -185,27 +187,27 @@ def test_tracks_without_their_turn_are_seen_as_from_the_prior_pose(first):
     stood = replace(PRIOR, heading_rad=PRIOR.heading_rad + turn[3])
     track = replace(known[0], time_s=known[0].time_s - known[0].time_s[-1] + 20_100.0 * DAY_S)
     seen = offset_trajectory(track, LENS, PRIOR, stood)
-    (back,) = without_creep([seen], LENS, PRIOR, log)
+    (back,) = without_slow_drift([seen], LENS, PRIOR, log)
     assert np.abs(seen.uv[0] - track.uv[0]).max() > 5
     same = np.isin(track.time_s, back.time_s)
     # Tilt and roll are believed to have moved by hundredths of a degree.
     assert_allclose(back.uv, track.uv[same], atol=2.0)
     still = with_moves(blank(120), np.zeros((120, NUMBERS)))
-    assert without_creep([track], LENS, PRIOR, still) == [track]
+    assert without_slow_drift([track], LENS, PRIOR, still) == [track]
 
 
 def test_bytes_keep_a_log_and_its_names():
     log = with_moves(blank(40), ramp(blank(40), 1, 0.3))
-    back = creep_log_from_bytes(creep_log_to_bytes(log))
+    back = slow_drift_log_from_bytes(slow_drift_log_to_bytes(log))
     # The names that stores have: another one needs a version of its own.
     assert set(flattened(log)) == {
         "day_idx", "groups", "pulls", "information", "reference_groups", "since_day"
     }  # fmt: skip
     for name, value in flattened(log).items():
         assert_array_equal(flattened(back)[name], value)
-    assert creep_log_to_bytes(back) == creep_log_to_bytes(log)
+    assert slow_drift_log_to_bytes(back) == slow_drift_log_to_bytes(log)
     with pytest.raises(CheckpointError, match="creep: not readable"):
-        creep_log_from_bytes(creep_log_to_bytes(log)[:-20])
+        slow_drift_log_from_bytes(slow_drift_log_to_bytes(log)[:-20])
 
 
 def test_days_of_a_chart_begin_with_none(first):
