@@ -5,6 +5,16 @@ from models.assessment.decide import change_in, is_site_changed
 from models.assessment.monitor import AlarmRate, alarm_chart_result, tracks_a_year
 from models.assessment.observe import MOST_PIECES
 from models.assessment.reasons import reason_of_drift
+from models.assessment.scored_tracks import (
+    ChartBasis,
+    ScoredTracks,
+    WindowContext,
+    chart_basis,
+    chart_of_scored,
+    score_part,
+    scored_window,
+    tail_of,
+)
 from models.assessment.slow_drift import begin_creep_log, log_creep, without_creep
 from models.assessment.values import (
     NO_TIME,
@@ -49,4 +59,12 @@ __all__ = [
     "tracks_a_year",
     "reason_of_drift",
     "without_creep",
+    "ChartBasis",
+    "ScoredTracks",
+    "WindowContext",
+    "chart_basis",
+    "chart_of_scored",
+    "score_part",
+    "scored_window",
+    "tail_of",
 ]

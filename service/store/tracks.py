@@ -116,6 +116,13 @@ def by_end(
     return [StoredTrack._make(row) for row in rows(columns)]
 
 
+def some(
+    session: Session, track_pks: Sequence[int], budget: LookBudget | None = None
+) -> Sequence[StoredTrack]:
+    """Some tracks, by their keys, in the order of their ends."""
+    return by_end(session, TrackRecord.id.in_(track_pks), budget=budget)
+
+
 def _only_last(
     column: InstrumentedAttribute[Any], track_pks: Sequence[int]
 ) -> SQLColumnExpression[Any]:

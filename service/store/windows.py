@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, ForeignKey, Select, and_, delete, exists, func, select
 from sqlalchemy.orm import Mapped, Session, mapped_column
@@ -63,6 +63,21 @@ def window(
 ) -> Sequence[StoredTrack]:
     """The tracks of a window in the order of their ends."""
     return by_end(session, TrackRecord.id.in_(window_ids(session, bounds)), budget=budget)
+
+
+class NewTrack(NamedTuple):
+    """Key and times of a track that is not in the monitor's state yet."""
+
+    id: int
+    started_s: float
+    ended_s: float
+
+
+def newer_than(session: Session, bounds: WindowBounds, newest_pk: int) -> list[NewTrack]:
+    """Tracks within bounds that were stored after one, without their points."""
+    columns = TrackRecord.id, TrackRecord.started_s, TrackRecord.ended_s
+    rows = session.execute(select(*columns).where(*_inside(bounds), TrackRecord.id > newest_pk))
+    return [NewTrack._make(row) for row in rows]
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:
