@@ -5,6 +5,12 @@ from models.assessment.decide import change_in, is_site_changed
 from models.assessment.monitor import AlarmRate, alarm_chart_result, tracks_a_year
 from models.assessment.observe import MOST_PIECES
 from models.assessment.reasons import reason_of_drift
+from models.assessment.scored_bytes import (
+    context_from_bytes,
+    context_to_bytes,
+    scored_from_bytes,
+    scored_to_bytes,
+)
 from models.assessment.scored_tracks import (
     ChartBasis,
     ScoredTracks,
@@ -67,4 +73,8 @@ __all__ = [
     "score_part",
     "scored_window",
     "tail_of",
+    "context_from_bytes",
+    "context_to_bytes",
+    "scored_from_bytes",
+    "scored_to_bytes",
 ]

@@ -12,8 +12,8 @@ from models.assessment import MOST_PIECES, AssessmentState
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.drift import DriftLimits
+from models.pose import LinkScale, linked
 from models.simulation.walkers import WalkConfig
-from models.tracks.linking import LinkScale, linked
 from models.tracks.trajectory import Trajectory, end_key
 from models.walking.config import FEWEST_WALKERS
 from service.estimation.carried_state import carried_state, last_estimate

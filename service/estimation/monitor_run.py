@@ -11,7 +11,10 @@ from models.assessment import (
     ScoredTracks,
     WindowContext,
     chart_of_scored,
+    context_from_bytes,
     score_part,
+    scored_from_bytes,
+    scored_to_bytes,
     tail_of,
 )
 from models.durations import DAY_S
@@ -23,10 +26,7 @@ from service.estimation.due import Circumstances, PreviousEstimate, is_full_esti
 from service.estimation.evidence import Unpacked
 from service.estimation.monitor_state import (
     basis_digest,
-    context_from_bytes,
     monitor_basis,
-    scored_from_bytes,
-    scored_to_bytes,
 )
 from service.estimation.site_cache import SiteCache
 from service.references import drift_limits, window_of
@@ -104,18 +104,18 @@ def load_new_tracks(
         return None
     newer = scored_from_bytes(kept.newer)
     scored = scored_from_bytes(kept.scored).merged(newer)
-    sizes = windows.newer_than(session, bounds, int(scored.key.max()))
-    if not sizes or int(scored.ended_s[-1] // DAY_S) != int(
-        max(size.ended_s for size in sizes) // DAY_S
-    ):
+    new = windows.newer_than(session, bounds, int(scored.key.max()))
+    if not new or unpacked.budget.leave_out([each.size for each in new]):
         return None
-    tail = tail_of(scored, min(size.started_s for size in sizes))
-    keys = np.concatenate([tail, [size.id for size in sizes]]).astype(np.int64)
+    if max(each.ended_s for each in new) // DAY_S != scored.ended_s[-1] // DAY_S:
+        return None
+    tail = tail_of(scored, min(each.started_s for each in new))
+    keys = np.concatenate([tail, [each.size.id for each in new]]).astype(np.int64)
     if keys.size > _LARGEST_PART * scored.key.size:
         return None
-    records = tracks.some(session, keys.tolist(), unpacked.budget)
+    records = tracks.some(session, keys.tolist())
     chart = sites.basis_of(session, camera, reference, inputs)
-    if chart is None or unpacked.budget.skipped or len(records) != keys.size:
+    if chart is None or len(records) != keys.size:
         return None
     records = sorted(records, key=lambda record: end_key(unpacked.feet(record)))
     firing = alerts.firing_by_estimates(session, camera_id)
@@ -128,7 +128,7 @@ def load_new_tracks(
         previous=previous,
         alerted=bool(firing & set(MOVED_KINDS)),
         unsure=AlertKind.UNSURE in firing,
-        tracks=scored.key.size + len(sizes),
+        tracks=scored.key.size + len(new),
     )
     if is_full_estimate_due(circumstances):
         return None

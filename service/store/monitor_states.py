@@ -2,7 +2,17 @@
 
 from typing import NamedTuple
 
-from sqlalchemy import ForeignKey, LargeBinary, String, bindparam, delete, func, select, update
+from sqlalchemy import (
+    ForeignKey,
+    Integer,
+    LargeBinary,
+    String,
+    bindparam,
+    delete,
+    func,
+    select,
+    update,
+)
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from service.store.cameras import SnapshotRecord
@@ -44,7 +54,8 @@ class Inputs(NamedTuple):
     snapshot_waits: int | None
 
 
-_CAMERA, _REFERENCE = bindparam("camera", type_=String), bindparam("reference")
+_CAMERA = bindparam("camera", type_=String)
+_REFERENCE = bindparam("reference", type_=Integer)
 _MODEL = newest_first(ModelRecord, _CAMERA, ModelRecord.created_at).limit(1)
 # Built once: every run of a camera asks for it.
 _INPUTS = select(

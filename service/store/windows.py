@@ -9,9 +9,10 @@ from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
 from service.store.engines.dialects import new_rows, whole
-from service.store.look_budget import LookBudget
+from service.store.look_budget import LookBudget, TrackSize
 from service.store.record import Record, count_where, foreign_key
 from service.store.tracks import (
+    SIZE_COLUMNS,
     Spans,
     StoredTrack,
     TrackRecord,
@@ -66,18 +67,20 @@ def window(
 
 
 class NewTrack(NamedTuple):
-    """Key and times of a track that is not in the monitor's state yet."""
+    """Size and times of a track that the monitor's state does not have yet."""
 
-    id: int
     started_s: float
     ended_s: float
+    size: TrackSize
 
 
 def newer_than(session: Session, bounds: WindowBounds, newest_pk: int) -> list[NewTrack]:
     """Tracks within bounds that were stored after one, without their points."""
-    columns = TrackRecord.id, TrackRecord.started_s, TrackRecord.ended_s
+    columns = TrackRecord.started_s, TrackRecord.ended_s, *SIZE_COLUMNS
     rows = session.execute(select(*columns).where(*_inside(bounds), TrackRecord.id > newest_pk))
-    return [NewTrack._make(row) for row in rows]
+    return [
+        NewTrack(started_s=row[0], ended_s=row[1], size=TrackSize._make(row[2:])) for row in rows
+    ]
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:
