@@ -74,6 +74,8 @@ class ScoredTracks:
 
     def merged(self, newer: "ScoredTracks") -> "ScoredTracks":
         """The tracks with those of another value added, which replace tracks of the same keys."""
+        if not newer.key.size:
+            return self
         older = self.without(newer.key)
         whole = ScoredTracks(
             key=np.concatenate([older.key, newer.key]),

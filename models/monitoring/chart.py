@@ -247,8 +247,15 @@ def highest(ratios: Ratios, apart: Array) -> float:
 
 def _ratio(shown: Array, strengths: Array) -> Array:
     """Log likelihood ratios of offsets (..., K), each as strong as is likeliest in its reach."""
-    times = np.clip(shown / strengths, 1.0, config.STRONGEST)
-    return np.asarray(times * shown - times**2 * strengths / 2)
+    times = np.asarray(shown / strengths)
+    np.maximum(times, 1.0, out=times)
+    np.minimum(times, config.STRONGEST, out=times)
+    ratio = np.asarray(times * shown)
+    times *= times
+    times *= strengths
+    times /= 2
+    ratio -= times
+    return ratio
 
 
 def slope_of(chart: DriftChart, parameter: int) -> Array:

@@ -4,7 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, ForeignKey, Select, and_, delete, exists, func, select
+from sqlalchemy import (
+    ColumnElement,
+    ForeignKey,
+    Select,
+    String,
+    and_,
+    bindparam,
+    delete,
+    exists,
+    func,
+    select,
+)
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
@@ -74,10 +85,25 @@ class NewTrack(NamedTuple):
     size: TrackSize
 
 
+# Built once: each monitor run asks for it.
+_NEWER_THAN = select(TrackRecord.started_s, TrackRecord.ended_s, *SIZE_COLUMNS).where(
+    *counting(bindparam("camera", type_=String)),
+    TrackRecord.id > bindparam("newest_pk"),
+    TrackRecord.started_s >= bindparam("started_from_s"),
+    # Sums, so that SQLite goes by the index of keys: that of ends has the whole window.
+    TrackRecord.ended_s + 0.0 > bindparam("ended_after_s"),
+    TrackRecord.ended_s + 0.0 >= bindparam("ended_from_s"),
+)
+_NO_BOUND_S = -1e18  # before all times of tracks
+
+
 def newer_than(session: Session, bounds: WindowBounds, newest_pk: int) -> list[NewTrack]:
     """Tracks within bounds that were stored after one, without their points."""
-    columns = TrackRecord.started_s, TrackRecord.ended_s, *SIZE_COLUMNS
-    rows = session.execute(select(*columns).where(*_inside(bounds), TrackRecord.id > newest_pk))
+    names = "started_from_s", "ended_after_s", "ended_from_s"
+    times = {name: getattr(bounds, name) for name in names}
+    values = {name: _NO_BOUND_S if at is None else at for name, at in times.items()}
+    query = _NEWER_THAN.where(*outside(bounds.without)) if bounds.without else _NEWER_THAN
+    rows = session.execute(query, {**values, "camera": bounds.camera_id, "newest_pk": newest_pk})
     return [
         NewTrack(started_s=row[0], ended_s=row[1], size=TrackSize._make(row[2:])) for row in rows
     ]

@@ -1,11 +1,13 @@
-"""What a refresh costs: CPU of a look at a full window of a still camera, and of all around it.
+"""CPU of an estimation run at a full window of a stationary camera, by kind of run.
 
-    python -m tests.benchmarks.refresh
+    python -m tests.benchmarks.runs
 
-First the job alone, in this process, over a real store: in steady state, beginning at what the last
-look found, and beside it in the same run the full search of all poses. Then an estimate all told:
-the CPU of a real service with its workers, from new tracks posted to the pose served, growth of the
-map included. Limits are for a quiet machine: whoever else computes on its cores slows them down.
+First the job alone, in this process, over a real store, medians of 20: a monitor run with 1, 5 and
+10 new tracks, a run that scores the whole window (what a monitor run was before the scores were
+stored), and a full estimate. Then full estimates of tracks in other forms, and an estimate all
+told: the CPU of a real service with its workers, from new tracks posted to the pose served, growth
+of the map included. Limits are for a quiet machine: other processes on its cores slow it down, so
+compare the ratios.
 """
 
 import os
@@ -20,31 +22,41 @@ from pathlib import Path
 import psutil
 from fastapi.testclient import TestClient
 from rich.console import Console
-from sqlalchemy import delete
 
 from service.app import create_app
 from service.commands.migrate import migrate
 from service.settings import Settings
-from service.store.references import LastPoseRecord
+from service.store import monitor_states
+from service.store.cameras import CameraRecord
 from service.workers.estimate import run_estimate
 from tests.conftest import CAMERA
 from tests.running import RunningService, free_port, wait_for
 from tests.service.street import PRIOR, Street
 
-REFERENCE, WINDOW, NEW, REFRESHES = 200, 400, 10, 10
-FORMS = {"points": 100.0, "boxes": 100.0, "long": 200.0}  # ms of CPU that a look may take
-LIMIT_S = 0.2  # of CPU, for an estimate all told
+REFERENCE, WINDOW, NEW, RUNS = 200, 400, 10, 20
+MONITOR_NEW = (1, 5, 10)  # new tracks of a monitor run
+MONITOR_MS, FULL_MS = 8.0, 150.0  # of CPU: limit of a monitor run; a full estimate when that began
+FORMS = {"boxes": 150.0, "long": 250.0}  # ms of CPU of a full estimate of other tracks
+LIMIT_S, _POSTS = 0.2, 10  # of CPU, for an estimate all told; of so many posts
 
 
 def main() -> None:
-    """Measure short tracks with and without boxes, long ones, and an estimate all told."""
+    """Measure monitor runs, full estimates and an estimate all told."""
     console = Console(width=110)
+    with _street() as street:
+        monitor_ms, whole_ms, full_ms = _runs(street)
+    for new, ms in monitor_ms.items():
+        console.print(
+            f"monitor run, {new} new of {WINDOW}: {ms:.1f} ms of CPU, {ms / MONITOR_MS:.2f} of the "
+            f"limit of {MONITOR_MS:g} ms; {ms / whole_ms:.2f} of a run that scores the whole "
+            f"window ({whole_ms:.1f} ms), {ms / full_ms:.3f} of a full estimate"
+        )
+    console.print(f"full estimate: {full_ms:.0f} ms of CPU, {full_ms / FULL_MS:.2f} of {FULL_MS:g}")
     for form, limit_ms in FORMS.items():
         with _street() as street:
-            steady_ms, full_ms = _looks(street, form)
+            ms = _full_ms(street, form)
         console.print(
-            f"{form}: {steady_ms:.0f} ms of CPU a refresh, {steady_ms / full_ms:.2f} of a full "
-            f"search ({full_ms:.0f} ms), {steady_ms / limit_ms:.2f} of the limit of {limit_ms:g} ms"
+            f"full estimate, {form}: {ms:.0f} ms of CPU, {ms / limit_ms:.2f} of the limit"
         )
     cpu_s, took_s = _all_told()
     console.print(
@@ -57,7 +69,7 @@ def main() -> None:
 def _street() -> Iterator[Street]:
     """A street before a service without workers, in a folder of its own."""
     os.environ["SUREFOOT_ALLOWED_HOSTS"] = "testserver"  # TestClient's name
-    with tempfile.TemporaryDirectory(prefix="surefoot-refresh-") as folder:
+    with tempfile.TemporaryDirectory(prefix="surefoot-runs-") as folder:
         settings = Settings(data_dir=Path(folder) / "data")
         migrate(settings)
         with TestClient(create_app(settings)) as http:
@@ -67,26 +79,47 @@ def _street() -> Iterator[Street]:
             street.close()
 
 
-def _looks(street: Street, form: str) -> tuple[float, float]:
-    """Milliseconds of CPU of a look that begins at the last one, and of a full one; medians."""
+def _fill(street: Street, form: str) -> None:
+    """Have a reference learned and a window filled."""
     for count in (REFERENCE, WINDOW):
         _walk(street, count, form)
         run_estimate(street.context, "corner")
-    steady_ms = statistics.median(_look_ms(street, form) for _ in range(REFRESHES))
-    return steady_ms, statistics.median(
-        _look_ms(street, form, forgetful=True) for _ in range(REFRESHES)
-    )
 
 
-def _look_ms(street: Street, form: str, *, forgetful: bool = False) -> float:
-    _walk(street, NEW, form)
-    if forgetful:
+def _runs(street: Street) -> tuple[dict[int, float], float, float]:
+    """Milliseconds of CPU: monitor runs by new tracks, a whole window's, a full estimate's."""
+    _fill(street, "points")
+    monitor_ms: dict[int, list[float]] = {new: [] for new in MONITOR_NEW}
+    whole_ms, full_ms = [], []
+    for _ in range(RUNS):
+        full_ms.append(_run_ms(street, 1, "points", kind="full"))
+        for new, found in monitor_ms.items():
+            found.append(_run_ms(street, new, "points", kind="monitor"))
         with street.context.store.write() as session:
-            session.execute(delete(LastPoseRecord))
+            monitor_states.forget(session)
+        whole_ms.append(_run_ms(street, 5, "points", kind="whole"))
+    medians = {new: statistics.median(found) for new, found in monitor_ms.items()}
+    return medians, statistics.median(whole_ms), statistics.median(full_ms)
+
+
+def _full_ms(street: Street, form: str) -> float:
+    """Median milliseconds of CPU of a full estimate of tracks in a form."""
+    _fill(street, form)
+    return statistics.median(_run_ms(street, NEW, form, kind="full") for _ in range(RUNS // 2))
+
+
+def _run_ms(street: Street, new: int, form: str, *, kind: str) -> float:
+    """Milliseconds of CPU of a run with so many new tracks, which has to be of a kind."""
+    _walk(street, new, form)
+    with street.context.store.write() as session:
+        session.get_one(CameraRecord, "corner").full_estimate_asked = kind == "full"
+    before = street.pose()
     began_s = time.process_time()
     run_estimate(street.context, "corner")
     took_ms = 1000 * (time.process_time() - began_s)
-    assert street.pose()["tracks"] >= WINDOW
+    after = street.pose()
+    assert (after["updated_at"] != before["updated_at"]) == (kind == "full")
+    assert after["checked_at"] > before["checked_at"]
     return took_ms
 
 
@@ -99,7 +132,7 @@ def _walk(street: Street, count: int, form: str) -> None:
 
 def _all_told() -> tuple[float, float]:
     """Seconds of CPU of a service and its workers for each estimate, and until it is served."""
-    with tempfile.TemporaryDirectory(prefix="surefoot-refresh-") as folder:
+    with tempfile.TemporaryDirectory(prefix="surefoot-runs-") as folder:
         # A training takes minutes of a core, and the served pose needs none.
         settings = Settings(data_dir=Path(folder) / "data", port=free_port(), trainings="off")
         migrate(settings)
@@ -116,7 +149,7 @@ def _all_told() -> tuple[float, float]:
             time.sleep(5.0)
             idle_s = (_cpu_s(service) - idle_s) / 5.0
             took_s, began_s, cpu_s = [], time.monotonic(), _cpu_s(service)
-            for _ in range(REFRESHES):
+            for _ in range(_POSTS):
                 posted_s = time.monotonic()
                 street.walk(PRIOR, NEW)
                 wait_for(lambda: _has_newest(street), every_s=0.1)
@@ -125,7 +158,7 @@ def _all_told() -> tuple[float, float]:
             cpu_s = _cpu_s(service) - cpu_s - idle_s * (time.monotonic() - began_s)
         finally:
             service.stop()
-    return cpu_s / REFRESHES, statistics.median(took_s)
+    return cpu_s / _POSTS, statistics.median(took_s)
 
 
 def _register(http: TestClient) -> None:
