@@ -55,7 +55,7 @@ class Inputs(NamedTuple):
 
 
 _CAMERA = bindparam("camera", type_=String)
-_REFERENCE = bindparam("reference", type_=Integer)
+_REFERENCE = bindparam("reference_pk", type_=Integer)
 _MODEL = newest_first(ModelRecord, _CAMERA, ModelRecord.created_at).limit(1)
 # Built once: every run of a camera asks for it.
 _INPUTS = select(
@@ -77,7 +77,7 @@ _NEWER = (
 
 def inputs(session: Session, camera_id: str, reference_id: int) -> Inputs:
     """Versions of the inputs of a camera."""
-    values = {"camera": camera_id, "reference": reference_id}
+    values = {"camera": camera_id, "reference_pk": reference_id}
     return Inputs._make(session.execute(_INPUTS, values).one())
 
 

@@ -35,6 +35,7 @@ from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
 from service.estimation.seen_picture import ask_in_doubt
 from service.store import monitor_states
+from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
 from service.store.look_budget import LookBudget
 from service.training import drop_model, fetch_weights, load_pending, save_predictions
@@ -52,6 +53,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
     camera rests, longer each time, and the failure is told; others are not held up.
     """
     with context.store.write(camera_id) as session:
+        _camera = session.get(CameraRecord, camera_id)  # kept, or each step would read it anew
         if leave_poisoned(session, camera_id):
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
             return
