@@ -105,15 +105,15 @@ def load_new_tracks(
     newer = scored_from_bytes(kept.newer)
     scored = scored_from_bytes(kept.scored).merged(newer)
     new = windows.newer_than(session, bounds, int(scored.key.max()))
-    if not new or unpacked.budget.leave_out([each.size for each in new]):
+    if unpacked.budget.leave_out([each.size for each in new]):
         return None
-    if max(each.ended_s for each in new) // DAY_S != scored.ended_s[-1] // DAY_S:
+    if any(each.ended_s // DAY_S > scored.ended_s[-1] // DAY_S for each in new):
         return None
-    tail = tail_of(scored, min(each.started_s for each in new))
+    tail = tail_of(scored, min((each.started_s for each in new), default=np.inf))
     keys = np.concatenate([tail, [each.size.id for each in new]]).astype(np.int64)
     if keys.size > _LARGEST_PART * scored.key.size:
         return None
-    records = tracks.some(session, keys.tolist())
+    records = tracks.some(session, keys.tolist()) if new else ()
     chart = sites.basis_of(session, camera, reference, inputs)
     if chart is None or len(records) != keys.size:
         return None
@@ -137,7 +137,7 @@ def load_new_tracks(
         basis=kept.basis,
         scored=scored,
         newer=newer,
-        keys=np.array([record.id for record in records]),
+        keys=np.array([record.id for record in records], dtype=np.int64),
         trajectories=tuple(unpacked.seen(record, camera.intrinsics) for record in records),
         chart=chart,
         context=context_from_bytes(kept.context),
@@ -157,8 +157,10 @@ def load_new_tracks(
 
 def monitor_new_tracks(found: NewTracks) -> MonitoredTracks | None:
     """Score the new tracks and read the chart; None if a full estimate is due."""
-    part = score_part(found.keys, found.trajectories, found.chart, found.context)
-    window = found.scored.merged(part)
+    window, newer = found.scored, found.newer
+    if found.keys.size:  # else an earlier run has read all tracks
+        part = score_part(found.keys, found.trajectories, found.chart, found.context)
+        window, newer = window.merged(part), newer.merged(part)
     window = window.newest(found.people, float(window.ended_s[-1]) - found.days_s)
     chart = chart_of_scored(window, found.chart, found.limits)
     previous = found.circumstances.previous
@@ -172,7 +174,6 @@ def monitor_new_tracks(found: NewTracks) -> MonitoredTracks | None:
     )
     if is_full_estimate_due(circumstances):
         return None
-    newer = found.newer.merged(part)
     return MonitoredTracks(
         camera_id=found.camera_id, basis=found.basis, newer=scored_to_bytes(newer)
     )

@@ -1,6 +1,7 @@
 """Between full estimates of a stationary camera, new tracks update the monitor alone."""
 
 from datetime import UTC, datetime, timedelta
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -57,9 +58,7 @@ def test_monitor_run_reads_and_scores_new_tracks_alone(stationary, monkeypatch):
     assert known.key.size == 120
     assert whole.newer == b""
 
-    def refuse(*_, **__):
-        raise AssertionError("the whole window was read")
-
+    refuse = Mock(side_effect=AssertionError("the whole window was read"))
     monkeypatch.setattr("service.workers.estimate.load_evidence", refuse)
     for new in (1, 5):
         before = stationary.pose()
@@ -113,8 +112,10 @@ def test_setback_of_the_clock_deletes_monitor_states(stationary):
     assert monitor_state(stationary) is None
 
 
-def test_run_without_new_tracks_keeps_checked_at(stationary):
+def test_run_without_new_tracks_keeps_checked_at(stationary, monkeypatch):
     before = stationary.pose()
+    refuse = Mock(side_effect=AssertionError("the whole window was read"))
+    monkeypatch.setattr("service.workers.estimate.load_evidence", refuse)
     assert stationary.look() == before
 
 
