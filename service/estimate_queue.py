@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from models.reasons import Reason, Value
 from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode
-from service.store import estimates, tracks
+from service.store import cameras, estimates, tracks
 from service.store.cameras import CameraRecord
 from service.store.run_budget import RunBudget
 
@@ -144,14 +144,15 @@ def finish_run(
     No run of this camera starts for `rest_s`, so that other cameras have their turn. `failures`
     are those beside the served estimate.
     """
-    camera = session.get(CameraRecord, camera_id)
-    if camera is not None:
-        if camera.read_track_pk != newest_pk:
-            camera.read_track_pk, camera.checked_at = newest_pk, _now()
-        camera.estimate_tries = 0
-        camera.estimate_error = camera.estimate_failing_since = None
-        camera.estimate_after = _now() + timedelta(seconds=min(rest_s, LONGEST_COOLDOWN_S))
-        camera.missing_parts = failures
+    now = _now()
+    cameras.finish_run(
+        session,
+        camera_id,
+        newest_pk,
+        now,
+        now + timedelta(seconds=min(rest_s, LONGEST_COOLDOWN_S)),
+        failures,
+    )
 
 
 def note_partial_failures(session: Session, camera_id: str, failures: Reasons) -> None:

@@ -263,6 +263,13 @@ table(
     *needed(LargeBinary, "basis", "data"),
 )
 table(
+    "monitor_states",
+    key("camera_id", String(64), of("cameras.id")),
+    *needed(LargeBinary, "basis"),
+    *needed(Double, "tracks_a_year"),
+    *needed(LargeBinary, "context", "scored", "newer"),
+)
+table(
     "trainings",
     key("id", String(32)),
     camera(),

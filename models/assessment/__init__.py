@@ -5,6 +5,22 @@ from models.assessment.decide import change_in, is_site_changed
 from models.assessment.monitor import AlarmRate, alarm_chart_result, tracks_a_year
 from models.assessment.observe import MOST_PIECES
 from models.assessment.reasons import reason_of_drift
+from models.assessment.scored_bytes import (
+    context_from_bytes,
+    context_to_bytes,
+    scored_from_bytes,
+    scored_to_bytes,
+)
+from models.assessment.scored_tracks import (
+    ChartBasis,
+    ScoredTracks,
+    WindowContext,
+    chart_basis,
+    chart_of_scored,
+    score_part,
+    scored_window,
+    tail_of,
+)
 from models.assessment.slow_drift import begin_slow_drift_log, log_slow_drift, without_slow_drift
 from models.assessment.values import (
     NO_TIME,
@@ -49,4 +65,16 @@ __all__ = [
     "tracks_a_year",
     "reason_of_drift",
     "without_slow_drift",
+    "ChartBasis",
+    "ScoredTracks",
+    "WindowContext",
+    "chart_basis",
+    "chart_of_scored",
+    "score_part",
+    "scored_window",
+    "tail_of",
+    "context_from_bytes",
+    "context_to_bytes",
+    "scored_from_bytes",
+    "scored_to_bytes",
 ]

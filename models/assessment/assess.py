@@ -13,7 +13,7 @@ from functools import partial
 from models.assessment.decide import change_in, decide
 from models.assessment.estimate import detectable_moves, raised_by_slow_drift, since_alarm
 from models.assessment.explain import explain
-from models.assessment.monitor import chart_of, slow_drift_of
+from models.assessment.monitor import Charted, chart_of, slow_drift_of
 from models.assessment.observe import observe_window
 from models.assessment.values import (
     FIRST_STATE,
@@ -27,6 +27,7 @@ from models.assessment.values import (
 )
 from models.errors import TooFewTrajectoriesError
 from models.monitoring.chart import ChartResult
+from models.monitoring.group_scores import TrackScores
 from models.monitoring.slow_drift import SlowDrift
 from models.pose.estimating import (
     PartialFailure,
@@ -68,7 +69,8 @@ class Monitored:
     """Results of the first two stages: measurements, the drift chart and the slow drift.
 
     `site` is the one to estimate by: with the first map of paths if the camera drifts slowly.
-    `mapped` is whether it has a map at all.
+    `mapped` is whether it has a map at all. `scores` are those that the chart was made of; None
+    without a chart.
     """
 
     observed: Observed
@@ -76,6 +78,7 @@ class Monitored:
     mapped: bool
     chart: ChartResult | None
     slow_drift: SlowDrift | None
+    scores: TrackScores | None = None
     failures: tuple[PartialFailure, ...] = ()
 
     @property
@@ -114,13 +117,14 @@ def monitor(
     slow_drift = unless_failed(failed, "anchor", partial(slow_drift_of, site, limits.alarms_a_year))
     if slow_drift is not None and slow_drift.moved and site.baseline is not None:
         site = replace(site, paths=site.baseline.paths, chart=site.baseline.chart)
-    chart = _chart(observed, site, limits, 0, failed)
+    charted = _chart(observed, site, limits, 0, failed)
     return Monitored(
         observed=observed,
         site=site,
         mapped=mapped,
-        chart=chart,
+        chart=None if charted is None else charted.result,
         slow_drift=slow_drift,
+        scores=None if charted is None else charted.scores,
         failures=tuple(failed),
     )
 
@@ -159,7 +163,8 @@ def assess(
         warm_start = replace(warm_start, charted=window.suspicious, drifts_slowly=drifts_slowly)
     found = replace(found, moved_prior=moved_prior, warm_start=warm_start)
     if found.first:
-        chart = _chart(observed, site, limits, found.first, failed)
+        charted = _chart(observed, site, limits, found.first, failed)
+        chart = None if charted is None else charted.result
     alarmed = partial(since_alarm, found, observed.tracks, site, chart)
     found = unless_failed(failed, "chart", alarmed) or found
     counting = _counting(factors, observed, found, chart)
@@ -243,7 +248,7 @@ def _chart(
     limits: AssessmentLimits,
     first_idx: int,
     failed: list[PartialFailure],
-) -> ChartResult | None:
+) -> Charted | None:
     return unless_failed(failed, "chart", partial(chart_of, observed, site, limits, first_idx))
 
 

@@ -32,6 +32,7 @@ def observe_window(
         started_s=tuple(float(track.time_s[0]) for track in tracks),
         ended_s=tuple(float(track.time_s[-1]) for track in tracks),
         unanswered=unanswered,
+        walk_idx=walks.walk_idx,
         pieces=walks.reason,
         enough=enough,
     )

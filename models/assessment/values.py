@@ -119,14 +119,16 @@ FIRST_STATE = AssessmentState()
 class Observed:
     """Measurements of a window.
 
-    `pieces` is the reason that names a tracker which cuts walks; None where it cuts few. `enough`
-    is whether enough people came since the operator's last answer.
+    `walk_idx` (N,) is the last piece of the walk of each track. `pieces` is the reason that names a
+    tracker which cuts walks; None where it cuts few. `enough` is whether enough people came since
+    the operator's last answer.
     """
 
     tracks: Observations
     ended_s: tuple[float, ...]
     started_s: tuple[float, ...]
     unanswered: Mask
+    walk_idx: Index
     pieces: Reason | None
     enough: bool
 

@@ -130,18 +130,19 @@ def chart_result(
     *,
     calm_ratio: float,
     calm_groups: int,
+    ratios: "Ratios | None" = None,
 ) -> ChartResult | None:
-    """Chart result of now; None of fewer than 16 walking groups.
+    """Chart result of the present; None of fewer than 16 walking groups.
 
-    `scores` are of walking groups in the order of their ends, of whom 1000 may come to
-    `alarms_a_run` false alarms. The chart is calm below `calm_ratio` of its level, for
-    `calm_groups` in a row.
+    `scores` are of walking groups in the order of their ends, of which 1000 may cause
+    `alarms_a_run` false alarms. The chart is calm if it is below `calm_ratio` of its level for
+    `calm_groups` in a row. `ratios` are those of the chart, if they are at hand.
     """
     if len(scores.values) < config.FEWEST_GROUPS:
         return None
     most = int(config.LENGTHS[-1])
     newest = chart.bounded(scores.values[-most:])
-    path = trace(ratios_of(chart), newest - chart.mean)
+    path = trace(ratios or ratios_of(chart), newest - chart.mean)
     level = chart.level(alarms_a_run)
     since = _last_calm(path.statistic < calm_ratio * level, calm_groups)
     at = len(newest) - 1
@@ -246,8 +247,15 @@ def highest(ratios: Ratios, apart: Array) -> float:
 
 def _ratio(shown: Array, strengths: Array) -> Array:
     """Log likelihood ratios of offsets (..., K), each as strong as is likeliest in its reach."""
-    times = np.clip(shown / strengths, 1.0, config.STRONGEST)
-    return np.asarray(times * shown - times**2 * strengths / 2)
+    times = np.asarray(shown / strengths)
+    np.maximum(times, 1.0, out=times)
+    np.minimum(times, config.STRONGEST, out=times)
+    ratio = np.asarray(times * shown)
+    times *= times
+    times *= strengths
+    times /= 2
+    ratio -= times
+    return ratio
 
 
 def slope_of(chart: DriftChart, parameter: int) -> Array:

@@ -8,10 +8,9 @@ from models.geometry.pose import CameraPose, array_of
 from models.geometry.rotation import Array, Index
 from models.monitoring import config
 from models.monitoring.chart import OFFSET_GRID, DriftChart, highest, ratios_of
-from models.monitoring.group_scores import SCORES, Usual, scores_at
+from models.monitoring.group_scores import SCORES, Usual, score_tracks, scores_at
 from models.paths.folds import Fold, Folds
 from models.paths.likelihood import walkers_of
-from models.paths.path_tests import groups_in_time
 from models.quantiles import SD_OF_MEDIAN_DEVIATION
 from models.tracks.observations import Observations, check_in_time, of_tracks
 from models.walking.reference_learning import relearned
@@ -100,8 +99,8 @@ def _fold_scores(
     seen = of_tracks(observations, fold.test_idx)
     speed_reference = relearned(of_tracks(observations, fold.train_idx), prior, site)
     usual = Usual(prior=prior, speed_reference=speed_reference, paths=fold.paths)
-    _, _, last = groups_in_time(fold.walkers)
-    still = scores_at(seen, fold.walkers, usual, np.zeros(4))
+    still = score_tracks(seen, usual, walkers=fold.walkers).groups
+    last = still.last
     # Evenly over the time: mornings and evenings answer differently.
     some = np.linspace(0, last.size - 1, min(last.size, wanted)).astype(np.int64)
     answers = np.zeros((1 + len(OFFSET_GRID), 0, SCORES))
@@ -115,7 +114,7 @@ def _fold_scores(
         moves = [(np.zeros(4), 1.0), *((-offset.step, offset.stretch) for offset in OFFSET_GRID)]
         answers = np.stack([scores_at(few, walkers, usual, *move) for move in moves])
     return _FoldScores(
-        still=still, times=fold.test_idx[last], before=answers[0], offset=answers[1:]
+        still=still.values, times=fold.test_idx[last], before=answers[0], offset=answers[1:]
     )
 
 

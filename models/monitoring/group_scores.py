@@ -18,7 +18,7 @@ from models.geometry.rotation import Array, Index
 from models.monitoring import config
 from models.paths.config import REACH
 from models.paths.likelihood import PathModel, Walkers, walkers_of
-from models.paths.path_tests import along_paths, groups_in_time, sums_of_groups
+from models.paths.path_tests import gains_along_paths, sums_by_group
 from models.tracks.observations import Observations, Steps, check_in_time
 from models.walking.field import Learned
 from models.walking.fit import per_track
@@ -46,19 +46,66 @@ class GroupScores:
     last: Index
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScoreContext:
+    """Values of a whole window that the scores of each of its tracks depend on.
+
+    `origin_s` is the start of a bin of time of walking groups, `busyness` (16,) that of unseen
+    ground at each pose that tracks are scored at.
+    """
+
+    origin_s: float
+    busyness: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackScores:
+    """Scores (N, 14) of the tracks (N,) that walk, and the label (N,) of each one's group."""
+
+    people: Index
+    label: Index
+    values: Array
+    context: ScoreContext
+
+    @property
+    def groups(self) -> GroupScores:
+        """Mean scores of the walking groups."""
+        return mean_by_group(self.people, self.label, self.values)
+
+
+def mean_by_group(people: Index, label: Index, values: Array) -> GroupScores:
+    """Mean scores of walking groups by tracks (N,), labels (N,) and scores (N, 14) of tracks."""
+    sums, number, last = sums_by_group(people, label, values)
+    return GroupScores(values=sums / number[:, None], last=last)
+
+
 def score_groups(
     observations: Observations, usual: Usual, walkers: Walkers | None = None
 ) -> GroupScores:
-    """The scores of all walking groups among tracks, at the prior pose.
+    """Scores of all walking groups among tracks, at the prior pose.
+
+    Raises:
+        ShapeError: tracks that are not in the order of their ends.
+    """
+    return score_tracks(observations, usual, walkers=walkers).groups
+
+
+def score_tracks(
+    observations: Observations,
+    usual: Usual,
+    context: ScoreContext | None = None,
+    walkers: Walkers | None = None,
+) -> TrackScores:
+    """Scores of tracks at the prior pose; of a part of a window by the `context` of the whole.
 
     Raises:
         ShapeError: tracks that are not in the order of their ends.
     """
     check_in_time(observations)
     if walkers is None:
-        walkers = walkers_of(observations, array_of(usual.prior))
-    _, _, last = groups_in_time(walkers)
-    return GroupScores(values=scores_at(observations, walkers, usual, np.zeros(4)), last=last)
+        origin_s = None if context is None else context.origin_s
+        walkers = walkers_of(observations, array_of(usual.prior), origin_s)
+    return _scored(observations, walkers, usual, np.zeros(4), 1.0, context)
 
 
 def scores_at(
@@ -70,27 +117,47 @@ def scores_at(
 ) -> Array:
     """Scores (P, 14) at a pose beside the prior: some tilt, roll, log height, heading (4,) on.
 
-    By a clock whose times are longer by a factor, everybody is as much slower.
+    By a clock whose times are longer by a factor `stretch`, everybody is as much slower.
     """
+    return _scored(observations, walkers, usual, beside, stretch, None).groups.values
+
+
+def _scored(
+    observations: Observations,
+    walkers: Walkers,
+    usual: Usual,
+    beside: Array,
+    stretch: float,
+    context: ScoreContext | None,
+) -> TrackScores:
     at = array_of(usual.prior) + beside
-    if not walkers.people:
-        return np.zeros((0, SCORES))
+    people = np.unique(walkers.steps.rows.owner_idx)
+    if not people.size:
+        unknown = ScoreContext(origin_s=0.0, busyness=np.full(2 * len(_STEPS), np.nan))
+        return TrackScores(
+            people=people,
+            label=people,
+            values=np.zeros((0, SCORES)),
+            context=context or unknown,
+        )
     parameters = plane_parameters_of(usual.prior) + beside[:3]
     observations = replace(observations, steps=_slowed(observations.steps, stretch))
     walkers = replace(walkers, steps=_slowed(walkers.steps, stretch))
     slopes = per_track(
         channels_of(observations, usual.speed_reference, usual.prior), parameters
     ).gradient
-    scores = np.concatenate(
-        [
-            -slopes,
-            _bounded(observations, walkers, usual, parameters),
-            along_paths(walkers, usual.paths, at, _STEPS),
-        ],
-        axis=1,
+    bounded = _bounded(observations, walkers, usual, parameters)
+    given = None if context is None else context.busyness
+    gains, busyness = gains_along_paths(walkers, usual.paths, at, _STEPS, given)
+    if context is None:
+        origin_s = float(walkers.steps.rows.time_s.min())
+        context = ScoreContext(origin_s=origin_s, busyness=busyness)
+    return TrackScores(
+        people=people,
+        label=walkers.group_idx[people],
+        values=np.concatenate([-slopes, bounded, gains], axis=1)[people],
+        context=context,
     )
-    sums, people, _ = sums_of_groups(walkers, scores)
-    return np.asarray(sums / people[:, None])
 
 
 def _slowed(steps: Steps, stretch: float) -> Steps:

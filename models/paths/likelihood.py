@@ -106,10 +106,20 @@ class PathModel:
         return Likelihood(value=float(values.sum()), values=values, scores=scores)
 
     def track_log_likelihoods(self, walkers: Walkers, candidates: Array) -> Array:
-        """The values (K, N) of `likelihood` seen from candidates (K, 4), without scores.
+        """Values (K, N) of `likelihood` seen from candidates (K, 4), without scores.
 
-        Some at once, which takes half of the time.
+        Several at once take half of the time.
         """
+        return self.values_at(walkers, candidates)[0]
+
+    def values_at(
+        self, walkers: Walkers, candidates: Array, busyness: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Values (K, N) as `track_log_likelihoods`, and the busyness (K,) of unseen ground.
+
+        The busyness is the likeliest for these walkers, unless it is given.
+        """
+        levels = np.full(len(candidates), np.nan) if busyness is None else busyness
         seen, beyond = self.coverage.seen_from(self.intrinsics, candidates)
         return values_of_tracks(
             self._rows(walkers),
@@ -119,6 +129,7 @@ class PathModel:
             self._busyness(),
             np.maximum(seen, config.LEAST_SEEN),
             beyond,
+            levels,
             walkers.tracks,
         )
 
@@ -164,8 +175,13 @@ class PathModel:
         )
 
 
-def walkers_of(observations: Observations, candidate: Array) -> Walkers:
-    """The steps that are walked, seen from a candidate (4,) that is about right."""
+def walkers_of(
+    observations: Observations, candidate: Array, origin_s: float | None = None
+) -> Walkers:
+    """Steps that are walked, seen from a candidate (4,) that is about right.
+
+    `origin_s` is as for `walking_groups_of`.
+    """
     placed = place_steps(observations.steps, candidate)
     moving = placed.valid & (placed.length_m > config.STANDING_MPS * observations.steps.seconds)
     steps = steps_where(observations.steps, moving)
@@ -176,7 +192,12 @@ def walkers_of(observations: Observations, candidate: Array) -> Walkers:
         steps=steps,
         weight=np.minimum(1.0, config.TRACK_STEPS / number[rows.owner_idx]),
         group_idx=walking_groups_of(
-            rows.time_s, rows.owner_idx, placed.place[moving], way[moving], observations.tracks
+            rows.time_s,
+            rows.owner_idx,
+            placed.place[moving],
+            way[moving],
+            observations.tracks,
+            origin_s,
         ),
         tracks=observations.tracks,
     )

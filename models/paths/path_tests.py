@@ -66,32 +66,49 @@ def group_scores(walkers: Walkers, paths: PathModel, at: Array) -> tuple[Array, 
 
 
 def along_paths(walkers: Walkers, paths: PathModel, at: Array, steps: Array) -> Array:
-    """The gain in log likelihood of tracks (N, S) some steps (S, 4) on against as far back."""
-    on, back = np.split(
-        paths.track_log_likelihoods(walkers, np.concatenate([at + steps, at - steps])), 2
-    )
-    return np.asarray((on - back).T)
+    """Gain in log likelihood of tracks (N, S) some steps (S, 4) on against as far back."""
+    return gains_along_paths(walkers, paths, at, steps)[0]
+
+
+def gains_along_paths(
+    walkers: Walkers, paths: PathModel, at: Array, steps: Array, busyness: Array | None = None
+) -> tuple[Array, Array]:
+    """Gains (N, S) as `along_paths`, and the busyness (2 S,) of unseen ground at each pose.
+
+    The busyness is the likeliest for these walkers, unless it is given.
+    """
+    poses = np.concatenate([at + steps, at - steps])
+    values, busyness = paths.values_at(walkers, poses, busyness)
+    on, back = np.split(values, 2)
+    return np.asarray((on - back).T), busyness
 
 
 def sums_of_groups(walkers: Walkers, values: Array) -> tuple[Array, Index, Index]:
     """Sums (P, S) of values of tracks (N, S) by walking group, their people, their last tracks."""
-    people, group_of, last = groups_in_time(walkers)
-    sums = np.zeros((last.size, values.shape[1]))
-    np.add.at(sums, group_of, values[people])
-    return sums, np.bincount(group_of), last
-
-
-def groups_in_time(
-    walkers: Walkers,
-) -> tuple[Index, Index, Index]:
-    """Tracks with a step (N,), the group (N,) of each, and each group's last track (P,), rising."""
     people = np.unique(walkers.steps.rows.owner_idx)
-    labels, group_of = np.unique(walkers.group_idx[people], return_inverse=True)
+    return sums_by_group(people, walkers.group_idx[people], values[people])
+
+
+def sums_by_group(people: Index, label: Index, values: Array) -> tuple[Array, Index, Index]:
+    """Sums (P, S) of values (N, S) by walking group, the people (P,), the last track (P,) of each.
+
+    `people` (N,) are tracks in the order of their ends, `label` (N,) names the group of each.
+    Groups are in the order of their last tracks.
+    """
+    group_of, last = _in_time(people, label)
+    sums = np.zeros((last.size, values.shape[1]))
+    np.add.at(sums, group_of, values)
+    return sums, np.bincount(group_of, minlength=last.size), last
+
+
+def _in_time(people: Index, label: Index) -> tuple[Index, Index]:
+    """Group (N,) of each of some tracks, and the last track (P,) of each group, rising."""
+    labels, group_of = np.unique(label, return_inverse=True)
     last = np.zeros(labels.size, dtype=np.int64)
     np.maximum.at(last, group_of, people)
     rank = np.empty(labels.size, dtype=np.int64)
     rank[np.argsort(last)] = np.arange(labels.size)
-    return people, rank[group_of], np.sort(last)
+    return rank[group_of], np.sort(last)
 
 
 def learn_scores(scores: Array, bent: Array, seed: int) -> StillScores:

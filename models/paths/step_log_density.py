@@ -159,24 +159,31 @@ def values_of_tracks(
     busyness: Busyness,
     seen: Array,
     beyond: Array,
+    levels: Array,
     tracks: int,
-) -> Array:
+) -> tuple[Array, Array]:
     """Values (K, tracks) at K candidates, by `rotations` (K, 3, 3) and `log_heights` (K,).
 
-    `seen` (K, S) and `beyond` (K,) are each candidate's, as of `likeliest_busyness`.
+    `seen` (K, S) and `beyond` (K,) are each candidate's, as of `likeliest_busyness`. `levels` (K,)
+    are the levels of busyness; NaN means the likeliest one.
+
+    Returns:
+        Values (K, tracks) and the levels (K,) by which they were made.
     """
-    values = np.empty((len(rotations), tracks))
+    values, used = np.empty((len(rotations), tracks)), levels.copy()
     no_turns, no_slopes = np.empty((0, 3, 3)), np.zeros((seen.shape[1], 4))
     for candidate in range(len(rotations)):
         rotation, log_height = rotations[candidate], log_heights[candidate]
         densities = step_log_densities(steps, grid, rotation, no_turns, log_height)
         own, away = seen[candidate], beyond[candidate]
-        busy = likeliest_busyness(densities, steps, busyness, own, away)
+        if math.isnan(used[candidate]):
+            used[candidate] = likeliest_busyness(densities, steps, busyness, own, away)
+        busy = used[candidate]
         log_share, extra = np.log(own + busy * away), busy * busyness.typical
         values[candidate], _ = likelihood_of_tracks(
             densities, steps, extra, log_share, no_slopes, tracks
         )
-    return values
+    return values, used
 
 
 @compiled

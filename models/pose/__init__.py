@@ -41,7 +41,7 @@ from models.pose.power import PEOPLE, smallest_told
 from models.pose.self_calibration import SelfCalibration, self_calibrate
 from models.pose.site import Baseline, CameraSite, assume_site, learn_site
 from models.simulation.walkers import WalkConfig
-from models.tracks.linking import count_walks, link_pieces
+from models.tracks.linking import LinkScale, count_walks, linked
 from models.tracks.observations import Observations
 from models.tracks.trajectory import Trajectory
 from models.tracks.walks import Walks, observe, observe_walks
@@ -52,6 +52,7 @@ __all__ = [
     "CLOCK",
     "FEWEST_BESIDE",
     "JointEstimate",
+    "LinkScale",
     "SpeedReference",
     "chart_from_bytes",
     "chart_to_bytes",
@@ -93,7 +94,7 @@ __all__ = [
     "drift_of",
     "estimate_pose",
     "learn_site",
-    "link_pieces",
+    "linked",
     "observe",
     "pose_posterior",
     "Hypothesis",

@@ -41,6 +41,30 @@ class Ends:
     valid: Mask
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkScale:
+    """Values of a whole window by which two of its tracks are linked.
+
+    `usual_mps` is the usual pace, `log_room` the log determinant of the covariance of strangers'
+    places and velocities, `rivals` the pairs for each track.
+    """
+
+    usual_mps: float
+    log_room: float
+    rivals: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Links:
+    """The piece before (N,) each track, as of `link_pieces`, and the scale of the links.
+
+    The scale is None of tracks of which none begins shortly after the end of another.
+    """
+
+    before: Index
+    scale: LinkScale | None
+
+
 def link_pieces(
     trajectories: Sequence[Trajectory], intrinsics: Intrinsics, pose: CameraPose
 ) -> Index:
@@ -50,24 +74,34 @@ def link_pieces(
     that counts as a person of its own does less harm than two people taken for one. The order in
     which the tracks are given changes nothing.
 
-    `pose` is about where the camera stands, its prior pose.
+    `pose` is the camera's prior pose.
     """
+    return linked(trajectories, intrinsics, pose).before
+
+
+def linked(
+    trajectories: Sequence[Trajectory],
+    intrinsics: Intrinsics,
+    pose: CameraPose,
+    scale: LinkScale | None = None,
+) -> Links:
+    """Links of tracks; of a part of a window by the `scale` of the whole."""
     before = np.full(len(trajectories), -1, dtype=np.int64)
     if len(trajectories) < 2:
-        return before
+        return Links(before=before, scale=scale)
     heads, tails = _both_ends(trajectories, intrinsics, pose)
     earlier, later = _pairs(heads, tails)
     if not earlier.size:
-        return before
-    apart, misfit = _misfit(heads, tails, earlier, later)
+        return Links(before=before, scale=scale)
+    apart, misfit, scale = _misfit(heads, tails, earlier, later, scale)
     near = (apart <= config.FARTHEST) & (misfit < 0)
     rank = np.argsort(misfit[near], kind="stable")
     earlier, later, misfit = earlier[near][rank], later[near][rank], misfit[near][rank]
-    linked = _clear_links(
+    chosen = _clear_links(
         earlier, later, misfit, _of_each(earlier, before.size), _of_each(later, before.size)
     )
-    before[later[linked]] = earlier[linked]
-    return before
+    before[later[chosen]] = earlier[chosen]
+    return Links(before=before, scale=scale)
 
 
 def count_walks(
@@ -98,8 +132,10 @@ def _pairs(heads: Ends, tails: Ends) -> tuple[Index, Index]:
     return earlier[kept], later[kept]
 
 
-def _misfit(heads: Ends, tails: Ends, earlier: Index, later: Index) -> tuple[Array, Array]:
-    """Chi squares (P,) of pairs, and twice the log of how much likelier strangers are than each.
+def _misfit(
+    heads: Ends, tails: Ends, earlier: Index, later: Index, scale: LinkScale | None
+) -> tuple[Array, Array, LinkScale]:
+    """Chi squares (P,) of pairs, twice the log odds of strangers against each, and the scale.
 
     Both velocities foretell where the later piece begins: their mean crosses the gap. Strangers are
     where any two are of which one begins after the other's end.
@@ -107,8 +143,11 @@ def _misfit(heads: Ends, tails: Ends, earlier: Index, later: Index) -> tuple[Arr
     gap_s = heads.time_s[later] - tails.time_s[earlier]
     ahead, behind = tails.velocity[earlier], heads.velocity[later]
     paces = np.linalg.norm(ahead, axis=1), np.linalg.norm(behind, axis=1)
-    usual = float(np.median(np.linalg.norm(tails.velocity[tails.valid], axis=1)))
-    usual = max(usual, config.SLOWEST_MPS)
+    if scale is None:
+        usual = float(np.median(np.linalg.norm(tails.velocity[tails.valid], axis=1)))
+        usual = max(usual, config.SLOWEST_MPS)
+    else:
+        usual = scale.usual_mps
     wander = config.WANDER * np.maximum((paces[0] + paces[1]) / 2, config.LEAST_PACE * usual)
     # Of a line through evenly spread points, noise of neighbours being alike.
     jitter = sum(
@@ -131,9 +170,14 @@ def _misfit(heads: Ends, tails: Ends, earlier: Index, later: Index) -> tuple[Arr
     )
     misfit = (config.LINK_FREEDOM + 4) * np.log1p(apart / config.LINK_FREEDOM)
     misfit = misfit + np.log(np.linalg.det(of_place) * np.linalg.det(of_turn))
-    room = _spread(off, config.STRANGERS_S * usual) + _spread(turn, usual)
-    rivals = max(earlier.size / heads.time_s.size, 1.0)
-    return apart, misfit - room + 2 * np.log(config.STRANGERS * rivals)
+    if scale is None:
+        scale = LinkScale(
+            usual_mps=usual,
+            log_room=_spread(off, config.STRANGERS_S * usual) + _spread(turn, usual),
+            rivals=max(earlier.size / heads.time_s.size, 1.0),
+        )
+    odds = 2 * np.log(config.STRANGERS * scale.rivals)
+    return apart, misfit - scale.log_room + odds, scale
 
 
 def _of_each(end: Index, count: int) -> tuple[Index, Index]:

@@ -154,8 +154,9 @@ def _rows(owner_idx: Index, run: Index, time_s: Array, count: int) -> Rows:
     linked: Mask = np.zeros(owner_idx.size, dtype=bool)
     linked[1:] = run[1:] == run[:-1]
     number = np.maximum(np.bincount(owner_idx, minlength=count), 1)
-    # Sums of epoch seconds lose digits: from the first row on.
-    since_s = time_s - (time_s[0] if time_s.size else 0.0)
+    # Sums of epoch seconds lose digits: count from each track's first row, whatever came before.
+    first = np.searchsorted(owner_idx, owner_idx)
+    since_s = time_s - time_s[first]
     middle_s = np.bincount(owner_idx, since_s, count) / number
     when = (since_s - middle_s[owner_idx]) / 10
     return Rows(owner_idx=owner_idx, linked=linked, time_s=time_s, when=when, owners=count)

@@ -241,14 +241,21 @@ def count_walking_groups(speeds: Measured) -> int:
 
 
 def walking_groups_of(
-    time_s: Array, owner_idx: Index, place: Array, direction: Array, owners: int
+    time_s: Array,
+    owner_idx: Index,
+    place: Array,
+    direction: Array,
+    owners: int,
+    origin_s: float | None = None,
 ) -> Index:
-    """The group (owners,) of each track, by its walked steps (M,): one of its tracks stands for it.
+    """Group (owners,) of each track by its walked steps (M,): the number of one of its tracks.
 
-    `time_s` (M,) is when each was, `place` (M, 2) where on the ground in metres, `direction` (M, 2)
-    its unit vector. Tracks without steps are each a walking group.
+    `time_s` (M,) is the time of each step, `place` (M, 2) its place on the ground in metres,
+    `direction` (M, 2) its unit vector. A track without steps is a walking group of its own.
+    `origin_s` is the start of a bin of time; None means the first step. Steps of a part of a window
+    need the origin of the whole window, or they get other groups.
     """
-    since_s = time_s - time_s.min(initial=np.inf)
+    since_s = time_s - (time_s.min(initial=np.inf) if origin_s is None else origin_s)
     time_bin = np.floor(since_s / config.GROUP_BIN_S + 1e-3).astype(np.int64)
     order = np.lexsort((time_bin, owner_idx))
     fresh = (np.diff(time_bin[order], prepend=-1) != 0) | (

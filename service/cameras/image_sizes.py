@@ -14,7 +14,7 @@ from service.alerts.alerts import close_pose_alerts
 from service.enums import Outcome
 from service.errors import ConflictError
 from service.formats.scaling import ImageSize, image_sizes_of
-from service.store import references, tracks, windows
+from service.store import monitor_states, references, tracks, windows
 from service.store.access import name_in
 from service.store.cameras import CameraRecord
 
@@ -79,6 +79,7 @@ def declare_size(session: Session, camera: CameraRecord, size: ImageSize, by: st
     if before == after or not tracks.rescale(session, camera.id, source, before, after):
         return False
     windows.forget_predictions(session, camera.id, source)
+    monitor_states.forget(session, camera.id)
     close_pose_alerts(session, camera.id, Outcome.RELEARNED, name_in(session, by))
     return True
 

@@ -39,7 +39,7 @@ from models.regression.averaging import (
     TrackPredictions,
     averaged_estimate,
 )
-from service.estimation.due import is_full_estimate_due
+from service.estimation.due import Circumstances, is_full_estimate_due
 from service.estimation.evidence import Evidence, SeenTrack
 from service.estimation.moved_zones import MovedZones, moved_zones
 from service.estimation.partial_failures import PartialFailures
@@ -62,6 +62,7 @@ class ComputedEstimate:
     zones: MovedZones | None = None
     failures: Reasons = ()
     last: LastPoseRecord | None = None
+    monitored: Monitored | None = None
 
     @property
     def reasons(self) -> Reasons:
@@ -95,7 +96,17 @@ def compute_estimate(
         monitored = monitor(window, site, limits, failed)
     except TooFewTrajectoriesError:
         return None
-    if not is_full_estimate_due(evidence, monitored):
+    circumstances = Circumstances(
+        asked=evidence.asked,
+        learned=evidence.site is not None,
+        previous=evidence.previous,
+        alerted=evidence.state.alerted,
+        unsure=evidence.state.unsure,
+        tracks=len(evidence.tracks),
+        suspicious=monitored.suspicious,
+        drifts_slowly=monitored.drifts_slowly,
+    )
+    if not is_full_estimate_due(circumstances):
         failures.take(monitored.failures)
         return monitored
     state = replace(evidence.state, warm_start=begin_of(evidence))
@@ -114,6 +125,7 @@ def compute_estimate(
         zones=zones,
         failures=tuple(failures.reasons),
         last=None if found.warm_start is None else _kept(evidence, found.warm_start),
+        monitored=monitored,
     )
 
 

@@ -1,8 +1,8 @@
 """When a full estimate is due; between two of them, new tracks update the monitor alone."""
 
-from models.assessment import Monitored
+from dataclasses import dataclass
+
 from service.enums import PoseState
-from service.estimation.evidence import Evidence
 
 # A stationary camera's pose hardly changes by fewer: a tenth of the window, 40 of 400 tracks.
 NEW_SHARE = 0.1
@@ -10,18 +10,50 @@ _WATCHED_MOVE = 0.1  # probability of a move from which each run is a full one
 _CALM = (PoseState.OK, PoseState.LEARNING)
 
 
-def is_full_estimate_due(evidence: Evidence, monitored: Monitored) -> bool:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PreviousEstimate:
+    """The last full estimate against the same reference.
+
+    `new_tracks` of the window came after it; `has_new_input` is whether an image or a model did.
+    """
+
+    state: PoseState
+    moved: float
+    new_tracks: int
+    has_new_input: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circumstances:
+    """The input of the decision whether a run is a full one.
+
+    `asked`: a page or an operator asks for an estimate. `learned`: the reference is known.
+    `alerted` and `unsure` are open alerts, `tracks` those of the window. `suspicious` and
+    `drifts_slowly` are results of the monitor.
+    """
+
+    asked: bool
+    learned: bool
+    previous: PreviousEstimate | None
+    alerted: bool
+    unsure: bool
+    tracks: int
+    suspicious: bool = False
+    drifts_slowly: bool = False
+
+
+def is_full_estimate_due(run: Circumstances) -> bool:
     """True if a full estimate can change something.
 
     It can if somebody asks for it, an operator acted, an image or a model is new, a tenth of the
     window is new, the camera may have moved, or the chart or the probability of a move is above its
     watch level.
     """
-    last, state = evidence.previous, evidence.state
-    if evidence.asked or evidence.site is None or last is None or last.has_new_input:
+    last = run.previous
+    if run.asked or not run.learned or last is None or last.has_new_input:
         return True
-    if state.alerted or state.unsure or last.state not in _CALM or last.moved >= _WATCHED_MOVE:
+    if run.alerted or run.unsure or last.state not in _CALM or last.moved >= _WATCHED_MOVE:
         return True
-    if monitored.suspicious or monitored.drifts_slowly:
+    if run.suspicious or run.drifts_slowly:
         return True
-    return last.new_tracks >= NEW_SHARE * len(evidence.tracks)
+    return last.new_tracks >= NEW_SHARE * run.tracks

@@ -3,9 +3,18 @@
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import numpy as np
 from sqlalchemy.orm import Session
 
-from models.assessment import NO_TIME, Assessment, CameraState, Decision, TimeSpan, change_in
+from models.assessment import (
+    NO_TIME,
+    Assessment,
+    CameraState,
+    Decision,
+    Monitored,
+    TimeSpan,
+    change_in,
+)
 from models.geometry.pose import PoseParameters
 from models.monitoring.drift import LIKELY, Drift, pose_after
 from models.pose import PosePosterior
@@ -18,11 +27,12 @@ from service.estimation.alert_evidence import alert_evidence, alternatives_of, d
 from service.estimation.carried_state import carried_state, last_estimate
 from service.estimation.compute import ComputedEstimate
 from service.estimation.evidence import Evidence
+from service.estimation.monitor_state import basis_digest, whole_window_state
 from service.job_queue import JobQueue
 from service.reasons import Reasons, ServiceCode
 from service.references import is_before, window_of
 from service.settings import Settings
-from service.store import alerts, journal, pictures, references
+from service.store import alerts, estimates, journal, monitor_states, pictures, references
 from service.store.alerts import SCALE_KINDS
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord, identifiable_drift
@@ -67,6 +77,38 @@ def save_estimate(
     tell_estimate(session, record, assessment.drift)
     _keep_last_pose(session, reference.id, found.last)
     return record
+
+
+def save_monitor_state(
+    session: Session,
+    evidence: Evidence,
+    found: ComputedEstimate | Monitored,
+    record: EstimateRecord | None,
+) -> None:
+    """Keep the scores of a whole window, so that the next run scores its new tracks alone.
+
+    `record` is the full estimate that was stored now; None means that the monitor follows the last
+    one.
+    """
+    camera_id = evidence.camera_id
+    monitored = found if isinstance(found, Monitored) else found.monitored
+    last = record or estimates.newest(session, camera_id)
+    if monitored is None or last is None or (record is None and monitored is not found):
+        monitor_states.forget(session, camera_id)
+        return
+    session.flush()  # a new estimate gets its number
+    state = whole_window_state(
+        camera_id,
+        basis_digest(evidence.monitor_basis, last.id),
+        monitored,
+        np.array([track.pk for track in evidence.tracks]),
+        evidence.link_scale,
+        evidence.tracks_a_year,
+    )
+    if state is None:
+        monitor_states.forget(session, camera_id)
+    else:
+        session.merge(state)
 
 
 def _counting_reference(

@@ -12,12 +12,13 @@ from models.assessment import MOST_PIECES, AssessmentState
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
 from models.monitoring.drift import DriftLimits
-from models.pose import link_pieces
+from models.pose import LinkScale, linked
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory, end_key
 from models.walking.config import FEWEST_WALKERS
-from service.enums import PoseState
 from service.estimation.carried_state import carried_state, last_estimate
+from service.estimation.due import PreviousEstimate
+from service.estimation.monitor_state import monitor_basis
 from service.estimation.seen_picture import SeenPicture, seen_picture
 from service.references import drift_limits, made_against, window_of
 from service.settings import Settings
@@ -77,12 +78,14 @@ _EXACT_ROUNDS, _LARGE_ROUND = 12, 0.25  # then by a quarter of the people wanted
 class Gathered:
     """Tracks, and whether there are `enough`: of as many people as were wanted.
 
-    `before` is the piece before each of a walk, as of `link_pieces`.
+    `before` is the piece before each of a walk, as of `link_pieces`, `link_scale` the scale by
+    which they were linked.
     """
 
     records: Sequence[StoredTrack]
     enough: bool
     before: npt.NDArray[np.int64]
+    link_scale: LinkScale | None
 
     @property
     def pieces(self) -> int:
@@ -120,12 +123,16 @@ def until_so_many(
         all_there_are = len(every) < limit
         chosen = every if all_there_are else every[-limit:] if newest else every[:limit]
         records = sorted(chosen, key=lambda record: end_key(unpacked.feet(record)))
-        before = link_pieces(
-            [unpacked.seen(record, intrinsics) for record in records], intrinsics, prior
-        )
+        links = linked([unpacked.seen(record, intrinsics) for record in records], intrinsics, prior)
+        before = links.before
         missing = wanted - int((before < 0).sum())
         if all_there_are or missing <= 0 or limit == most:
-            return Gathered(records=records, enough=not all_there_are, before=before)
+            return Gathered(
+                records=records,
+                enough=not all_there_are,
+                before=before,
+                link_scale=links.scale,
+            )
         if rounds >= _EXACT_ROUNDS:
             missing = max(missing, round(_LARGE_ROUND * wanted))
         limit = min(limit + missing, most)
@@ -165,19 +172,6 @@ def anchor_of(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PreviousEstimate:
-    """The last full estimate against the same reference.
-
-    `new_tracks` of the window came after it; `has_new_input` is whether an image or a model did.
-    """
-
-    state: PoseState
-    moved: float
-    new_tracks: int
-    has_new_input: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
@@ -188,7 +182,8 @@ class Evidence:
     tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
     estimate before ended, `picture` the result of the newest image. `zones` depend on the pose;
     `state` is what earlier assessments and the operators' answers left, `previous` the last full
-    estimate; `asked` is whether somebody asks for another one.
+    estimate; `asked` is whether a page or an operator asks for another one. `link_scale` is that of
+    `before`; `monitor_basis` names what the scores of the tracks depend on.
     """
 
     camera_id: str
@@ -215,6 +210,8 @@ class Evidence:
     state: AssessmentState = field(default_factory=AssessmentState)
     previous: PreviousEstimate | None = None
     asked: bool = False
+    link_scale: LinkScale | None = None
+    monitor_basis: str = ""
 
 
 def load_evidence(
@@ -289,6 +286,8 @@ def load_evidence(
         state=carried_state(session, reference),
         previous=_previous(last_estimate(session, reference), model, pks, picture),
         asked=asked,
+        link_scale=gathered.link_scale,
+        monitor_basis=monitor_basis(session, camera, reference, bounds),
     )
 
 

@@ -9,6 +9,7 @@ from service.store import (  # noqa: F401
     cameras,
     estimates,
     journal,
+    monitor_states,
     references,
     sources,
     tracks,

@@ -16,12 +16,14 @@ from sqlalchemy import (
     Row,
     String,
     bindparam,
+    case,
     cast,
     delete,
     func,
     or_,
     select,
     type_coerce,
+    update,
 )
 from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, defer, mapped_column
 
@@ -212,6 +214,37 @@ _SOME_SET_UP = _SET_UP.where(CameraRecord.id.in_(bindparam("cameras", expanding=
     CameraRecord.id
 )
 _PRIOR_POSE = newest_first(PriorPoseRecord, bindparam("camera")).limit(1)
+
+_RUN_ENDED = (
+    update(CameraRecord.__table__)  # type: ignore[arg-type]
+    .where(CameraRecord.id == bindparam("camera"))
+    .values(
+        read_track_pk=bindparam("newest"),
+        checked_at=case(
+            (CameraRecord.read_track_pk.is_distinct_from(bindparam("newest")), bindparam("now")),
+            else_=CameraRecord.checked_at,
+        ),
+        estimate_tries=0,
+        estimate_error=None,
+        estimate_failing_since=None,
+        estimate_after=bindparam("until"),
+        missing_parts=bindparam("failures"),
+    )
+)
+
+
+def finish_run(
+    session: Session,
+    camera_id: str,
+    newest_pk: int | None,
+    now: datetime,
+    until: datetime,
+    failures: Reasons,
+) -> None:
+    """Note that an estimation run read tracks up to one; the camera cools down until a time."""
+    values = {"camera": camera_id, "newest": newest_pk, "now": now}
+    session.execute(_RUN_ENDED, {**values, "until": until, "failures": failures})
+
 
 # A record takes ten times as long as what each post of tracks has to know of its camera.
 _AWAITED = Prepared(

@@ -242,7 +242,12 @@ class MaintenanceRecord(Record):
 
 _UNTIL = func.coalesce(MaintenanceRecord.ended_at, MaintenanceRecord.to_at)
 
-# Built once: each reconcile of a camera asks for it.
+# Built once: each run and each reconcile of a camera asks for them.
+_OF_CAMERA = (
+    select(MaintenanceRecord)
+    .where(MaintenanceRecord.camera_id == bindparam("camera"))
+    .order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
+)
 _JUST_OVER = select(MaintenanceRecord).where(
     MaintenanceRecord.camera_id == bindparam("camera"),
     MaintenanceRecord.to_at <= bindparam("now"),
@@ -258,11 +263,7 @@ def find_maintenance(session: Session, camera_id: str, window_id: str) -> Mainte
 
 def maintenance_of(session: Session, camera_id: str) -> Sequence[MaintenanceRecord]:
     """A camera's windows in the order of their beginnings."""
-    return session.scalars(
-        select(MaintenanceRecord)
-        .where(MaintenanceRecord.camera_id == camera_id)
-        .order_by(MaintenanceRecord.from_at, MaintenanceRecord.id)
-    ).all()
+    return session.scalars(_OF_CAMERA, {"camera": camera_id}).all()
 
 
 def maintenance_under_way(

@@ -19,6 +19,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import InstrumentedAttribute, Mapped, Session, mapped_column
 
+from service.store import monitor_states
 from service.store.cameras import CameraRecord
 from service.store.engines.sqlite import Prepared
 from service.store.record import Record, count_where
@@ -181,4 +182,5 @@ def forget(session: Session, record: SourceRecord) -> None:
             TrackRecord.camera_id == record.camera_id, TrackRecord.source == record.name
         )
     )
+    monitor_states.forget(session, record.camera_id)  # a new track may get the key of a deleted one
     session.delete(record)

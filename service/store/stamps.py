@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Column, ColumnElement, Table, func, literal, select, update
 from sqlalchemy.orm import Session
 
-from service.store import tracks
+from service.store import monitor_states, tracks
 from service.store.engines.dialects import earlier
 from service.store.record import Record, UtcDateTime
 
@@ -51,6 +51,7 @@ def follow_clock(
     back_s = round(set_back_by.total_seconds())
     limit_s = now.timestamp() + max_ahead_s
     changed = tracks.follow_clock(session, back_s, limit_s)
+    monitor_states.forget(session)  # they hold times of tracks
     for name, columns in _OF_TRACKS.items():
         table = Record.metadata.tables[name]
         for column in (table.c[each] for each in columns):

@@ -110,10 +110,22 @@ def by_end(
 
     columns: Sequence[SQLColumnExpression[Any]] = _COLUMNS
     if budget is not None:
-        skipped = budget.leave_out([TrackSize._make(row) for row in rows(_SIZE_COLUMNS)])
+        skipped = budget.leave_out([TrackSize._make(row) for row in rows(SIZE_COLUMNS)])
         if skipped:
             columns = [_only_last(column, skipped) for column in _COLUMNS]
     return [StoredTrack._make(row) for row in rows(columns)]
+
+
+_SOME = (
+    select(*_COLUMNS)
+    .where(TrackRecord.id.in_(bindparam("keys", expanding=True)))
+    .order_by(TrackRecord.ended_s, TrackRecord.id)
+)
+
+
+def some(session: Session, track_pks: Sequence[int]) -> Sequence[StoredTrack]:
+    """Some tracks, by their keys, in the order of their ends."""
+    return [StoredTrack._make(row) for row in session.execute(_SOME, {"keys": track_pks})]
 
 
 def _only_last(
@@ -169,7 +181,7 @@ def bytes_of_track() -> ColumnElement[int]:
     )
 
 
-_SIZE_COLUMNS = [
+SIZE_COLUMNS = [
     TrackRecord.id,
     TrackRecord.track_id,
     TrackRecord.ended_s - TrackRecord.started_s,

@@ -2,16 +2,28 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, ForeignKey, Select, and_, delete, exists, func, select
+from sqlalchemy import (
+    ColumnElement,
+    ForeignKey,
+    Select,
+    String,
+    and_,
+    bindparam,
+    delete,
+    exists,
+    func,
+    select,
+)
 from sqlalchemy.orm import Mapped, Session, mapped_column
 
 from models.durations import DAY_S
 from service.store.engines.dialects import new_rows, whole
 from service.store.record import Record, count_where, foreign_key
-from service.store.run_budget import RunBudget
+from service.store.run_budget import RunBudget, TrackSize
 from service.store.tracks import (
+    SIZE_COLUMNS,
     Spans,
     StoredTrack,
     TrackRecord,
@@ -63,6 +75,38 @@ def window(
 ) -> Sequence[StoredTrack]:
     """The tracks of a window in the order of their ends."""
     return by_end(session, TrackRecord.id.in_(window_ids(session, bounds)), budget=budget)
+
+
+class NewTrack(NamedTuple):
+    """Size and times of a track that the monitor's state does not have yet."""
+
+    started_s: float
+    ended_s: float
+    size: TrackSize
+
+
+# Built once: each monitor run asks for it.
+_NEWER_THAN = select(TrackRecord.started_s, TrackRecord.ended_s, *SIZE_COLUMNS).where(
+    *counting(bindparam("camera", type_=String)),
+    TrackRecord.id > bindparam("newest_pk"),
+    TrackRecord.started_s >= bindparam("started_from_s"),
+    # Sums, so that SQLite goes by the index of keys: that of ends has the whole window.
+    TrackRecord.ended_s + 0.0 > bindparam("ended_after_s"),
+    TrackRecord.ended_s + 0.0 >= bindparam("ended_from_s"),
+)
+_NO_BOUND_S = -1e18  # before all times of tracks
+
+
+def newer_than(session: Session, bounds: WindowBounds, newest_pk: int) -> list[NewTrack]:
+    """Tracks within bounds that were stored after one, without their points."""
+    names = "started_from_s", "ended_after_s", "ended_from_s"
+    times = {name: getattr(bounds, name) for name in names}
+    values = {name: _NO_BOUND_S if at is None else at for name, at in times.items()}
+    query = _NEWER_THAN.where(*outside(bounds.without)) if bounds.without else _NEWER_THAN
+    rows = session.execute(query, {**values, "camera": bounds.camera_id, "newest_pk": newest_pk})
+    return [
+        NewTrack(started_s=row[0], ended_s=row[1], size=TrackSize._make(row[2:])) for row in rows
+    ]
 
 
 def count_window(session: Session, bounds: WindowBounds) -> int:

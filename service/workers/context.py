@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from models.durations import HOUR_S
 from service.enums import RunKind
+from service.estimation.site_cache import SiteCache
 from service.job_queue import JobQueue
 from service.reasons import Reasons
 from service.settings import Settings
@@ -153,3 +154,4 @@ class JobContext:
     growth_budget: GrowthBudget = field(default_factory=GrowthBudget)
     steps: StepWatch = field(default_factory=StepWatch)
     reconciled: RoundRobin = field(default_factory=RoundRobin)
+    sites: SiteCache = field(default_factory=SiteCache)

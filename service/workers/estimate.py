@@ -20,7 +20,7 @@ from service.estimate_queue import (
 )
 from service.estimation.anchoring import compute_anchor_days, load_anchor_days, save_anchor_days
 from service.estimation.compute import ComputedEstimate, compute_estimate
-from service.estimation.estimates import save_estimate
+from service.estimation.estimates import save_estimate, save_monitor_state
 from service.estimation.evidence import Unpacked, load_evidence
 from service.estimation.growth import compute_growth, load_growth, save_growth
 from service.estimation.learning import (
@@ -29,11 +29,14 @@ from service.estimation.learning import (
     save_progress,
     save_reference,
 )
+from service.estimation.monitor_run import load_new_tracks, monitor_new_tracks
 from service.estimation.partial_failures import PartialFailures
 from service.estimation.picture_estimates import save_by_picture
 from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
 from service.estimation.seen_picture import ask_in_doubt
+from service.store import monitor_states
+from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
 from service.store.run_budget import RunBudget
 from service.store.runs import RunTotal
@@ -53,6 +56,7 @@ def run_estimate(context: JobContext, camera_id: str) -> None:
     """
     begun_s, kind = time.thread_time(), RunKind.FULL
     with context.store.write(camera_id) as session:
+        _camera = session.get(CameraRecord, camera_id)  # kept, or each step would read it anew
         if leave_poisoned(session, camera_id):
             log.warning("estimate_postponed", extra={"camera_id": camera_id})
             return
@@ -87,6 +91,8 @@ def _look(
     """
     store, settings = context.store, context.settings
     begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked(budget)
+    if _monitor(context, camera_id, newest_pk, unpacked, asked=asked):
+        return RunKind.MONITOR
     if propose_if_uncalibrated(context, camera_id, unpacked):
         with store.write(camera_id) as session:
             rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
@@ -109,6 +115,7 @@ def _look(
         failures.reasons.extend(skipped)
     found = None if evidence is None else compute_estimate(evidence, settings.seed, failures)
     with store.write(camera_id) as session:
+        record = None
         if evidence is not None and isinstance(found, ComputedEstimate):
             record = save_estimate(session, context.queue, settings, evidence, found)
             _log_estimate(record)
@@ -116,6 +123,8 @@ def _look(
                 ask_in_doubt(session, record, evidence.picture)
         if found is None or (evidence is not None and evidence.site is None):
             _log_estimate(save_by_picture(session, settings, camera_id))
+        if evidence is not None and found is not None and not skipped:
+            save_monitor_state(session, evidence, found, record)
         cooling = context.growth_cooldown.failures_of(camera_id)
         rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
         finish_run(
@@ -125,6 +134,29 @@ def _look(
         return RunKind.MONITOR
     _grow_unless_failed(context, camera_id, unpacked)
     return RunKind.FULL
+
+
+def _monitor(
+    context: JobContext,
+    camera_id: str,
+    newest_pk: int | None,
+    unpacked: Unpacked,
+    *,
+    asked: bool,
+) -> bool:
+    """Update the monitor by the new tracks alone; False if the whole window is needed."""
+    store, settings, begun_s = context.store, context.settings, time.monotonic()
+    with store.read() as session:
+        new = load_new_tracks(session, settings, camera_id, context.sites, unpacked, asked=asked)
+    found = None if new is None else monitor_new_tracks(new)
+    if found is None:
+        return False
+    with store.write(camera_id) as session:
+        monitor_states.keep_newer(session, camera_id, found.basis, found.newer)
+        rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
+        cooling = context.growth_cooldown.failures_of(camera_id)
+        finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=cooling)
+    return True
 
 
 def _log_estimate(record: EstimateRecord | None) -> None:

@@ -1,8 +1,8 @@
 """All benchmarks that end within minutes, one after the other: `python -m tests.benchmarks`.
 
-    python -m tests.benchmarks [--only refresh,requests] [--output benchmarks.json]
+    python -m tests.benchmarks [--only runs,requests] [--output benchmarks.json]
 
-Each is a process of its own and can be run by itself (`python -m tests.benchmarks.refresh`). What
+Each is a process of its own and can be run by itself (`python -m tests.benchmarks.runs`). What
 they say is printed as it comes; the file has it all, with the machine. Exits with 1 where one is
 beyond its limits.
 """
@@ -22,7 +22,7 @@ from rich.table import Table
 
 # What each is asked beside its name: here all are to end within some minutes.
 BENCHMARKS: dict[str, tuple[str, ...]] = {
-    "refresh": (),
+    "runs": (),
     "estimators": (),
     "first_estimate": (),
     "trainings": ("--only", "default"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from models.pose import count_walks
+from models.tracks.linking import Links
 from models.tracks.trajectory import Trajectory
 from service.estimation.evidence import Unpacked, until_so_many
 from service.store.tracks import TrackRecord, pack
@@ -74,9 +75,10 @@ def test_tracks_that_are_all_pieces_are_linked_a_few_times_and_not_for_each(monk
 
     def all_but_one(trajectories, *_):
         sizes.append(len(trajectories))
-        return np.where(np.arange(len(trajectories)) < 399, -1, 0)
+        before = np.where(np.arange(len(trajectories)) < 399, -1, 0)
+        return Links(before=before, scale=None)
 
-    monkeypatch.setattr("service.estimation.evidence.link_pieces", all_but_one)
+    monkeypatch.setattr("service.estimation.evidence.linked", all_but_one)
     found = until_so_many(lambda limit: records[:limit], 400, LENS, PRIOR, Unpacked())
     assert (found.enough, len(found.records)) == (True, 2_000)
     assert sizes[:12] == list(range(400, 412))
