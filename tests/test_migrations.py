@@ -47,6 +47,7 @@ def test_both_ways_on_whichever_database(settings):
 
 # A word for each column that takes those of a vocabulary alone.
 WORDS = {
+    "estimation_run_hours": {"kind": "full"},
     "cameras": {"projection": "perspective"},
     "prior_poses": {"origin": "registered"},
     "site_references": {"origin": "registered"},

@@ -51,7 +51,7 @@ class CheckWatch(threading.Thread):
         while True:
             stopping = self._stop_now.wait(POLL_S)
             with connected(self._database) as connection:
-                rows = connection.execute("SELECT id, looked_at_pk FROM cameras").fetchall()
+                rows = connection.execute("SELECT id, read_track_pk FROM cameras").fetchall()
             now_s = time.time()
             for camera_id, pk in rows:
                 known = self.checks[camera_id]

@@ -106,7 +106,7 @@ def checked(corner, store):
     with store.write() as session:
         session.execute(update(TrackRecord).values(received_at=now - timedelta(seconds=60)))
         camera = session.get(CameraRecord, "corner")
-        camera.looked_at_pk = session.query(TrackRecord.id).scalar()
+        camera.read_track_pk = session.query(TrackRecord.id).scalar()
         camera.checked_at = now - timedelta(seconds=56)
     return now
 

@@ -76,13 +76,13 @@ def test_health_page_shows_ages_runs_and_cpu_time(corner, store):
     with store.write() as session:
         session.execute(update(TrackRecord).values(received_at=now - timedelta(seconds=60)))
         camera = session.get(CameraRecord, "corner")
-        camera.looked_at_pk = session.query(TrackRecord.id).scalar()
+        camera.read_track_pk = session.query(TrackRecord.id).scalar()
         camera.checked_at = now - timedelta(seconds=51)
         runs.add(session, {RunKind.MONITOR: RunTotal(runs=7, cpu_s=9.0)}, now - timedelta(hours=24))
         runs.add(session, {RunKind.MONITOR: RunTotal(runs=200, cpu_s=1.2)}, now)
     page = corner.get("/ui/health").text
     age, cpu = (row for row in page.split("<tr>") if "<td>Monitoring</td>" in row)
-    assert age.count('<td class="number">9 seconds</td>') == 3
+    assert age.count('<td class="number" translate="no">9 seconds</td>') == 3
     for text in ("200", "1.2 s", "6.0 ms"):
         assert f'<td class="number">{text}</td>' in cpu
     assert 'class="line" d="M0 23.0' in cpu  # nothing before
