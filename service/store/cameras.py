@@ -241,7 +241,10 @@ def finish_run(
     until: datetime,
     failures: Reasons,
 ) -> None:
-    """Note that an estimation run read tracks up to one; the camera cools down until a time."""
+    """Note that an estimation run read tracks up to one; the camera cools down until a time.
+
+    A record of the camera that the session has loaded keeps its old values.
+    """
     values = {"camera": camera_id, "newest": newest_pk, "now": now}
     session.execute(_RUN_ENDED, {**values, "until": until, "failures": failures})
 
