@@ -25,7 +25,7 @@ def test_settings_that_pages_name_are_settings():
     """Those in capitals, with and without the prefix."""
     names = {name.upper() for name in Settings.model_fields}
     others = {"REACH", "NUMBA_CACHE_DIR", "TOKEN", "TOKEN_FILE", "SUREFOOT_URL"}  # of clients
-    others |= {"HABITS", "HABITS_OF_DAYS"}  # of models
+    others |= {"HABITS", "HABITS_OF_DAYS", "VACUUM"}  # of models, of SQLite
     for page in sorted((ROOT / "docs").rglob("*.md")):
         named = re.findall(r"`(?:SUREFOOT)?_?([A-Z][A-Z_]{2,}[A-Z])`", page.read_text())
         assert {name for name in named if not name.startswith("TEST_")} <= names | others, page
