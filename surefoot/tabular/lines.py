@@ -134,7 +134,7 @@ def _blocks(body: bytes) -> Iterator[tuple[int, list[str]]]:
 
 def _read_even(lines: Lines, block: list[str], head: Head, plan: Plan) -> bool:
     """Read a block at once, twice as fast, if all its lines are right; else read none of it."""
-    if max(map(len, block)) > MAX_LINE_CHARS:
+    if not head.cells or max(map(len, block)) > MAX_LINE_CHARS:  # no cells: only blank lines
         return False
     if head.decimal_comma:
         block = [line.replace(",", ".") for line in block]

@@ -264,6 +264,14 @@ def test_frames_need_a_rate_and_a_start():
     )  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "body", [b"", b"\r" * 64, b"\n\n", b" \t\n \r\n", b"\xef\xbb\xbf\n", b"#\n"]
+)
+def test_text_without_lines_has_no_tracks(body):
+    found = read(body)
+    assert (len(found.rows), len(found.broken)) == (0, 0)
+
+
 def test_line_with_another_number_of_columns_costs_its_own_track():
     body = table(MOT + ",1", MOT + ",1") + b"\n31,8,1,1"
     found = read(body)
