@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import yaml
 
-from service.formats.nesting import MAX_LEVELS, too_deep
+from surefoot.nesting import MAX_LEVELS, too_deep
 
 MAX_BYTES = 64 * 1024  # PyYAML holds the interpreter lock for about 1 ms per KiB
 _MERGE = "<<"

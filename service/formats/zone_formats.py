@@ -10,7 +10,6 @@ from typing import Any
 from models.tracks.scaling import Scaling
 from service.enums import ZoneOn
 from service.errors import MalformedError, TooLargeError, UnsupportedMediaTypeError
-from service.formats.nesting import check_levels
 from service.formats.scaling import read_scaling
 from service.formats.yaml_text import MAX_BYTES, read_yaml_text
 from service.formats.zones import Corner, Slot, Zone, refused, scaled, scaling_of, zones_of
@@ -22,6 +21,7 @@ from service.formats.zones_frigate import (
     frigate_template,
 )
 from service.formats.zones_geojson import geojson_slots, geojson_template
+from surefoot.nesting import check_levels
 
 JSON_TYPE, YAML_TYPE = "application/json", "application/yaml"
 GEOJSON_TYPE, AXIS_TYPE = "application/geo+json", "application/vnd.surefoot.axis-zones+json"

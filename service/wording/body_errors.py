@@ -39,18 +39,10 @@ _REASONS = {
     "dict_type": N_("must be an object (got {got})"),
     "model_attributes_type": N_("must be an object (got {got})"),
     "model_type": N_("must be an object (got {got})"),
-    "datetime_type": N_(
-        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
-    ),
-    "datetime_parsing": N_(
-        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
-    ),
-    "datetime_from_date_parsing": N_(
-        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
-    ),
-    "timezone_aware": N_(
-        "must be an RFC 3339 time with a zone, for example 2026-11-20T08:00:00Z (got {got})"
-    ),
+    "datetime_type": _TIME,
+    "datetime_parsing": _TIME,
+    "datetime_from_date_parsing": _TIME,
+    "timezone_aware": _TIME,
     "int_parsing_size": N_("must be a smaller whole number (got {got})"),
     "json_invalid": N_("is not JSON: {error}"),
     "enum": N_("must be {expected} (got {got})"),

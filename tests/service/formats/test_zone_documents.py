@@ -7,7 +7,6 @@ import pytest
 
 from service.enums import ZoneOn
 from service.errors import MalformedError, UnsupportedMediaTypeError
-from service.formats.nesting import MAX_LEVELS, check_levels
 from service.formats.zone_formats import (
     JSON_TYPE,
     YAML_TYPE,
@@ -17,6 +16,7 @@ from service.formats.zone_formats import (
     read_zones,
     write_zones,
 )
+from surefoot.nesting import MAX_LEVELS, check_levels
 from tests.conftest import SCENES
 
 PICTURE = (1280, 720)
