@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from service.access.activity import note as note_activity
-from service.alerts.groups import group_with
+from service.alerts.groups import group_with, new_group
 from service.enums import (
     Activity,
     AlertActivity,
@@ -28,6 +28,7 @@ from service.settings import Settings
 from service.store import alerts, journal, references, sources
 from service.store.alerts import AlertFilter, AlertRecord
 from service.store.journal import ActivityRecord
+from service.store.sources import Poster
 from service.wording.reasons import in_words
 
 # What of an alert's body an event has.
@@ -114,32 +115,15 @@ def open_alert(
 
 def open_group_alert(
     session: Session,
+    poster: Poster,
     kind: AlertKind,
-    severity: Severity,
     *,
-    track_source: str,
-    camera_ids: list[str],
+    camera_ids: Sequence[str],
     reasons: Reasons,
     source: AlertSource,
 ) -> AlertRecord:
-    """Open an alert about several cameras that one source feeds; it has no alerts as members."""
-    now = datetime.now(UTC)
-    record = AlertRecord(
-        id=secrets.token_hex(16),
-        camera_ids=camera_ids,
-        track_source=track_source,
-        kind=kind,
-        state=AlertState.FIRING,
-        source=source,
-        severity=severity,
-        reasons=reasons,
-        drift={},
-        notified=False,
-        opened_at=now,
-        updated_at=now,
-    )
-    session.add(record)
-    session.flush()
+    """Open an alert about several cameras of one poster; it has no alerts as members."""
+    record = new_group(session, poster, kind, source, camera_ids, reasons)
     _keep_activity(session, record, AlertActivity.OPENED, None)
     _tell(session, record, MessageType.ALERT_OPENED)
     return record

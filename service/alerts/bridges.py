@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from models.reasons import Reason, Value
 from service.alerts.alerts import close_alert, open_group_alert
-from service.enums import AlertKind, AlertSource, Outcome, Severity
+from service.enums import AlertKind, AlertSource, Outcome
 from service.reasons import ServiceCode
 from service.settings import Settings
 from service.store import alerts, bridges, cameras
@@ -88,9 +88,8 @@ def _follow(session: Session, record: BridgeRecord, problem: Reason | None) -> N
         return
     open_group_alert(
         session,
+        _poster(name),
         AlertKind.STALE,
-        Severity.CRITICAL,
-        track_source=name,
         camera_ids=fed,
         reasons=(problem,),
         source=AlertSource.UPKEEP,

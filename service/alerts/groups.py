@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from models.reasons import Reason
 from service.enums import AlertKind, AlertSource, AlertState, Severity
-from service.reasons import ServiceCode
+from service.reasons import Reasons, ServiceCode
 from service.settings import Settings
 from service.store import alerts, sources
 from service.store.alerts import AlertRecord
@@ -43,7 +43,7 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     if not known and not _enough(session, settings, poster, together):
         return None
     opened = group is None
-    group = group or _new_group(session, poster, kind)
+    group = group or new_group(session, poster, kind, AlertSource.GROUP)
     for member in together:
         member.group_id = group.id
     members = {str(member.camera_id) for member in together}
@@ -56,18 +56,26 @@ def group_with(session: Session, settings: Settings, record: AlertRecord) -> Ale
     return group if opened else None
 
 
-def _new_group(session: Session, poster: Poster, kind: AlertKind) -> AlertRecord:
+def new_group(
+    session: Session,
+    poster: Poster,
+    kind: AlertKind,
+    source: AlertSource,
+    camera_ids: Sequence[str] = (),
+    reasons: Reasons = (),
+) -> AlertRecord:
+    """Add a firing alert about several cameras of one poster."""
     now = datetime.now(UTC)
     group = AlertRecord(
         id=secrets.token_hex(16),
-        camera_ids=[],
+        camera_ids=list(camera_ids),
         track_source=poster.source,
         poster_id=poster.token_id,
         kind=kind,
         state=AlertState.FIRING,
-        source=AlertSource.GROUP,
+        source=source,
         severity=Severity.CRITICAL,
-        reasons=(),
+        reasons=reasons,
         drift={},
         notified=False,
         opened_at=now,
