@@ -1,5 +1,6 @@
 import pickle
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.settings import Settings
+from service.store.engines.store import Store
 from tests.conftest import CAMERA, Once
 from tests.service.bench import Bench
 from tests.service.fleet_bench import Fleet
@@ -32,6 +34,13 @@ def corner(http: TestClient) -> TestClient:
     """The same, with the camera `corner` registered."""
     assert http.post("/cameras", json=CAMERA).status_code == 201
     return http
+
+
+@pytest.fixture
+def store(settings: Settings) -> Iterator[Store]:
+    """The store of the application, opened by a test itself."""
+    with closing(Store(settings)) as made:
+        yield made
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """The token that `serve` makes for its bridge."""
 
-import contextlib
 from datetime import UTC, datetime
 
 import pytest
@@ -11,14 +10,7 @@ from service.commands.serve import run_service
 from service.data_dir import StartError
 from service.enums import TokenScope
 from service.store import access
-from service.store.engines.store import Store
 from tests.running import free_port
-
-
-@pytest.fixture
-def store(settings):
-    with contextlib.closing(Store(settings)) as store:
-        yield store
 
 
 def renewed(store):

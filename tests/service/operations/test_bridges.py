@@ -13,7 +13,6 @@ from service.commands.local_bridge import LocalBridge
 from service.operations.bridges import note_trouble
 from service.store import bridges
 from service.store.bridges import BridgeRecord
-from service.store.engines.store import Store
 from tests.conftest import CAMERA
 from tests.service.conftest import problem
 
@@ -30,13 +29,6 @@ BEAT = {
          "code": "malformed", "detail": "no JSON", "extract": "<b>secret</b>"}
     ],
 }  # fmt: skip
-
-
-@pytest.fixture
-def store(settings):
-    made = Store(settings)
-    yield made
-    made.close()
 
 
 def beat(http, **changes):

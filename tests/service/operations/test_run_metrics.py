@@ -15,7 +15,6 @@ from service.job_queue import JobQueue
 from service.operations.result_ages import result_ages
 from service.store import runs, tracks
 from service.store.cameras import CameraRecord
-from service.store.engines.store import Store
 from service.store.estimates import EstimateRecord
 from service.store.runs import RunTotal
 from service.store.tracks import TrackRecord
@@ -27,13 +26,6 @@ from tests.service.operations.test_metrics import scrape, value
 from tests.service.street import PRIOR, known_street
 
 RUNS, CPU_S = "surefoot_estimation_runs_total", "surefoot_estimation_cpu_seconds_total"
-
-
-@pytest.fixture
-def store(settings):
-    made = Store(settings)
-    yield made
-    made.close()
 
 
 def test_metrics_of_an_empty_service_have_no_runs_and_no_ages(http):

@@ -2,23 +2,14 @@
 
 from datetime import UTC, datetime, timedelta
 
-import pytest
 from sqlalchemy import update
 
 from service.enums import RunKind
 from service.store import runs, webhooks, workers
 from service.store.cameras import CameraRecord
-from service.store.engines.store import Store
 from service.store.runs import RunTotal
 from service.store.tracks import TrackRecord
 from tests.conftest import track
-
-
-@pytest.fixture
-def store(settings):
-    made = Store(settings)
-    yield made
-    made.close()
 
 
 def banner(http):
