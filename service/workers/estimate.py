@@ -2,7 +2,10 @@
 
 import logging
 import time
+from collections.abc import Callable
 from functools import partial
+
+from sqlalchemy.orm import Session
 
 from models.assessment import Monitored
 from models.effort import limited_effort
@@ -35,6 +38,7 @@ from service.estimation.picture_estimates import save_by_picture
 from service.estimation.pictures import compare, load_picture, save_picture
 from service.estimation.proposal import compute_proposal, load_people, save_proposal
 from service.estimation.seen_picture import ask_in_doubt
+from service.reasons import Reasons
 from service.store import monitor_states
 from service.store.cameras import CameraRecord
 from service.store.estimates import EstimateRecord
@@ -90,13 +94,13 @@ def _look(
         The kind of this run.
     """
     store, settings = context.store, context.settings
-    begun_s, failures, unpacked = time.monotonic(), PartialFailures(camera_id), Unpacked(budget)
-    if _monitor(context, camera_id, newest_pk, unpacked, asked=asked):
+    failures, unpacked = PartialFailures(camera_id), Unpacked(budget)
+    finish = partial(_finish, context, camera_id, newest_pk, time.monotonic())
+    if _monitor(context, camera_id, finish, unpacked, asked=asked):
         return RunKind.MONITOR
     if propose_if_uncalibrated(context, camera_id, unpacked):
         with store.write(camera_id) as session:
-            rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-            finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
+            finish(session, skipped_by(budget))
         return RunKind.FULL
     failures.unless_failed("picture", partial(compare_if_due, context, camera_id))
     missing = predict_pending(context, camera_id, unpacked)
@@ -104,8 +108,7 @@ def _look(
         failures.add("averaged estimate", missing)
     if not learn_if_due(context, camera_id, unpacked):
         with store.write(camera_id) as session:
-            rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-            finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=skipped_by(budget))
+            finish(session, skipped_by(budget))
         return RunKind.FULL
     failures.unless_failed("anchor", partial(log_slow_drift_if_due, context, camera_id, unpacked))
     with store.read() as session:
@@ -126,10 +129,7 @@ def _look(
         if evidence is not None and found is not None and not skipped:
             save_monitor_state(session, evidence, found, record)
         cooling = context.growth_cooldown.failures_of(camera_id)
-        rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        finish_run(
-            session, camera_id, newest_pk, rest_s=rest_s, failures=(*failures.reasons, *cooling)
-        )
+        finish(session, (*failures.reasons, *cooling))
     if isinstance(found, Monitored):
         return RunKind.MONITOR
     _grow_unless_failed(context, camera_id, unpacked)
@@ -139,13 +139,13 @@ def _look(
 def _monitor(
     context: JobContext,
     camera_id: str,
-    newest_pk: int | None,
+    finish: Callable[[Session, Reasons], None],
     unpacked: Unpacked,
     *,
     asked: bool,
 ) -> bool:
     """Update the monitor by the new tracks alone; False if the whole window is needed."""
-    store, settings, begun_s = context.store, context.settings, time.monotonic()
+    store, settings = context.store, context.settings
     with store.read() as session:
         new = load_new_tracks(session, settings, camera_id, context.sites, unpacked, asked=asked)
     found = None if new is None else monitor_new_tracks(new)
@@ -153,10 +153,21 @@ def _monitor(
         return False
     with store.write(camera_id) as session:
         monitor_states.keep_newer(session, camera_id, found.basis, found.newer)
-        rest_s = settings.estimate_rest * (time.monotonic() - begun_s)
-        cooling = context.growth_cooldown.failures_of(camera_id)
-        finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=cooling)
+        finish(session, context.growth_cooldown.failures_of(camera_id))
     return True
+
+
+def _finish(
+    context: JobContext,
+    camera_id: str,
+    newest_pk: int | None,
+    begun_s: float,
+    session: Session,
+    failures: Reasons,
+) -> None:
+    """Finish a run; the camera rests for a time in proportion to it."""
+    rest_s = context.settings.estimate_rest * (time.monotonic() - begun_s)
+    finish_run(session, camera_id, newest_pk, rest_s=rest_s, failures=failures)
 
 
 def _log_estimate(record: EstimateRecord | None) -> None:
