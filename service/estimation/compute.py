@@ -9,7 +9,6 @@ import numpy as np
 
 from models.assessment import (
     Assessment,
-    AssessmentLimits,
     DatedFactor,
     Monitored,
     TrackWindow,
@@ -86,7 +85,7 @@ def compute_estimate(
     """
     failures = failures or PartialFailures(evidence.camera_id)
     failed: list[PartialFailure] = []
-    site, limits = site_of(evidence, failed), limits_of(evidence)
+    site, limits = site_of(evidence, failed), evidence.limits
     window = TrackWindow(
         trajectories=[track.trajectory for track in evidence.tracks],
         unanswered=np.array([track.unanswered for track in evidence.tracks]),
@@ -109,7 +108,8 @@ def compute_estimate(
     if not is_full_estimate_due(circumstances):
         failures.take(monitored.failures)
         return monitored
-    state = replace(evidence.state, warm_start=begin_of(evidence))
+    basis = basis_of(evidence)
+    state = replace(evidence.state, warm_start=begin_of(evidence, basis))
     found = assess(monitored, site, state, limits, factors_of(evidence))
     failures.take(found.failures)
     seen = evidence.tracks[found.estimated.first :]
@@ -124,19 +124,8 @@ def compute_estimate(
         averaged=averaged,
         zones=zones,
         failures=tuple(failures.reasons),
-        last=None if found.warm_start is None else _kept(evidence, found.warm_start),
+        last=None if found.warm_start is None else _kept(evidence, basis, found.warm_start),
         monitored=monitored,
-    )
-
-
-def limits_of(evidence: Evidence) -> AssessmentLimits:
-    """The limits of a camera's assessment."""
-    return AssessmentLimits(
-        drift=evidence.limits,
-        alarms_a_year=evidence.alarms_a_year,
-        tracks_a_year=evidence.tracks_a_year,
-        moved_prior=evidence.moved_prior,
-        frame_rate_hz=evidence.frame_rate_hz,
     )
 
 
@@ -201,10 +190,10 @@ def basis_of(evidence: Evidence) -> bytes:
     return digest.digest()
 
 
-def begin_of(evidence: Evidence) -> WarmStart | None:
-    """Where the search may begin; None if none was kept on the same basis, by this release."""
+def begin_of(evidence: Evidence, basis: bytes) -> WarmStart | None:
+    """Where the search may begin; None if none was kept on this basis, by this release."""
     kept = evidence.last
-    if kept is None or kept.basis != basis_of(evidence):
+    if kept is None or kept.basis != basis:
         return None
     try:
         return warm_start_from_bytes(kept.data)
@@ -212,10 +201,10 @@ def begin_of(evidence: Evidence) -> WarmStart | None:
         return None
 
 
-def _kept(evidence: Evidence, found: WarmStart) -> LastPoseRecord:
+def _kept(evidence: Evidence, basis: bytes, found: WarmStart) -> LastPoseRecord:
     return LastPoseRecord(
         reference_id=evidence.reference_id,
-        basis=basis_of(evidence),
+        basis=basis,
         data=warm_start_to_bytes(found),
     )
 
@@ -223,7 +212,10 @@ def _kept(evidence: Evidence, found: WarmStart) -> LastPoseRecord:
 def _may_be_alerted(evidence: Evidence, found: Assessment) -> bool:
     """True if an alert may report zones: those of a stationary camera interest nobody."""
     return may_be_alerted(
-        found.posterior.moved, evidence.limits, found.slow_drift, alerted=evidence.state.alerted
+        found.posterior.moved,
+        evidence.limits.drift,
+        found.slow_drift,
+        alerted=evidence.state.alerted,
     )
 
 

@@ -103,7 +103,7 @@ def save_monitor_state(
         monitored,
         np.array([track.pk for track in evidence.tracks]),
         evidence.link_scale,
-        evidence.tracks_a_year,
+        evidence.limits.tracks_a_year,
     )
     if state is None:
         monitor_states.forget(session, camera_id)

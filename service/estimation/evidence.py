@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from sqlalchemy.orm import Session
 
-from models.assessment import MOST_PIECES, AssessmentState
+from models.assessment import MOST_PIECES, AssessmentLimits, AssessmentState
 from models.geometry.intrinsics import Intrinsics
 from models.geometry.pose import CameraPose
-from models.monitoring.drift import DriftLimits
 from models.pose import LinkScale, linked
 from models.simulation.walkers import WalkConfig
 from models.tracks.trajectory import Trajectory, end_key
@@ -176,14 +175,13 @@ class Evidence:
     """The tracks of a window in the order of their ends, and what they are judged by.
 
     `site` is the learned reference as bytes; None while it is being learned. So are `flow` and
-    `chart`; None where there is none. `predictions` has what the model in use says of the
-    tracks. `tracks_a_year` is how many come; `alarms_a_year` how many false ones are allowed.
-    `moved_prior` is how likely a move is before any track. `before` is the piece before each of the
-    tracks of a walk, as of `link_pieces`; None where nobody has looked yet. `last` is where the
-    estimate before ended, `picture` the result of the newest image. `zones` depend on the pose;
-    `state` is what earlier assessments and the operators' answers left, `previous` the last full
-    estimate; `asked` is whether a page or an operator asks for another one. `link_scale` is that of
-    `before`; `monitor_basis` names what the scores of the tracks depend on.
+    `chart`; None if there is none. `predictions` are by the model in use. `limits` are what an
+    alarm depends on. `before` is the piece before each track of a walk, as from `link_pieces`; None
+    if they were not linked yet. `last` is where the estimate before ended, `picture` the result of
+    the newest image. `zones` depend on the pose; `state` is what earlier assessments and the
+    operators' answers left, `previous` the last full estimate; `asked` is whether a page or an
+    operator asks for another one. `link_scale` belongs to `before`; `monitor_basis` names what the
+    scores of the tracks depend on.
     """
 
     camera_id: str
@@ -196,17 +194,13 @@ class Evidence:
     prior: CameraPose
     walk: WalkConfig
     tracks: tuple[SeenTrack, ...]
-    tracks_a_year: float
-    alarms_a_year: float
-    limits: DriftLimits
-    moved_prior: float
+    limits: AssessmentLimits
     model_id: str | None
     predictions: tuple[PredictionRecord, ...]
     before: npt.NDArray[np.int64] | None = None
     last: LastPoseRecord | None = None
     picture: SeenPicture | None = None
     zones: ZonesRecord | None = None
-    frame_rate_hz: float | None = None
     state: AssessmentState = field(default_factory=AssessmentState)
     previous: PreviousEstimate | None = None
     asked: bool = False
@@ -272,17 +266,13 @@ def load_evidence(
         prior=prior,
         walk=walk_of(camera),
         tracks=tuple(seen),
-        tracks_a_year=tracks.a_year(session, camera_id),
-        alarms_a_year=settings.false_alarms_per_year,
-        limits=drift_limits(settings),
-        moved_prior=settings.moved_prior,
+        limits=assessment_limits(settings, camera, tracks.a_year(session, camera_id)),
         model_id=None if model is None else model.id,
         predictions=tuple(rows),
         before=gathered.before,
         last=session.get(LastPoseRecord, reference.id),
         picture=picture,
         zones=drawn,
-        frame_rate_hz=camera.frame_rate_hz,
         state=carried_state(session, reference),
         previous=_previous(last_estimate(session, reference), model, pks, picture),
         asked=asked,
@@ -305,6 +295,19 @@ def _previous(
         moved=last.moved,
         new_tracks=sum(pk > last.newest_track_pk for pk in pks),
         has_new_input=other_model or (picture is not None and not picture.was_told(last)),
+    )
+
+
+def assessment_limits(
+    settings: Settings, camera: CameraRecord, tracks_a_year: float
+) -> AssessmentLimits:
+    """What an alarm about a camera depends on, at this rate of tracks."""
+    return AssessmentLimits(
+        drift=drift_limits(settings),
+        alarms_a_year=settings.false_alarms_per_year,
+        tracks_a_year=tracks_a_year,
+        moved_prior=settings.moved_prior,
+        frame_rate_hz=camera.frame_rate_hz,
     )
 
 

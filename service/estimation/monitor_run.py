@@ -23,13 +23,10 @@ from models.tracks.trajectory import Trajectory, end_key
 from service.enums import AlertKind
 from service.estimation.carried_state import last_estimate
 from service.estimation.due import Circumstances, PreviousEstimate, is_full_estimate_due
-from service.estimation.evidence import Unpacked
-from service.estimation.monitor_state import (
-    basis_digest,
-    monitor_basis,
-)
+from service.estimation.evidence import Unpacked, assessment_limits
+from service.estimation.monitor_state import basis_digest, monitor_basis
 from service.estimation.site_cache import SiteCache
-from service.references import drift_limits, window_of
+from service.references import window_of
 from service.settings import Settings
 from service.store import alerts, monitor_states, references, tracks, windows
 from service.store.alerts import MOVED_KINDS
@@ -141,13 +138,7 @@ def load_new_tracks(
         trajectories=tuple(unpacked.seen(record, camera.intrinsics) for record in records),
         chart=chart,
         context=context_from_bytes(kept.context),
-        limits=AssessmentLimits(
-            drift=drift_limits(settings),
-            alarms_a_year=settings.false_alarms_per_year,
-            tracks_a_year=kept.tracks_a_year,
-            moved_prior=settings.moved_prior,
-            frame_rate_hz=camera.frame_rate_hz,
-        ),
+        limits=assessment_limits(settings, camera, kept.tracks_a_year),
         people=bounds.tracks,
         days_s=bounds.days * DAY_S,
         last_pk=last.newest_track_pk,

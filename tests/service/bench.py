@@ -14,7 +14,7 @@ from models.pose.pose_fit import FusedEstimate, by_speeds_alone
 from models.reasons import Reason, TracksCode
 from models.regression.recipe import plan_to_config
 from models.walking.estimate import JointEstimate
-from service.estimation.compute import ComputedEstimate, limits_of, zones_of
+from service.estimation.compute import ComputedEstimate, zones_of
 from service.estimation.estimates import save_estimate
 from service.estimation.evidence import Evidence, load_evidence
 from service.job_queue import JobQueue
@@ -152,7 +152,7 @@ def made_up(
         trajectories=[each.trajectory for each in tracks],
         unanswered=np.array([each.unanswered for each in tracks]),
     )
-    limits = limits_of(evidence)
+    limits = evidence.limits
     observed = observe_window(window, evidence.intrinsics, evidence.prior, limits.drift.people)
     assessment = conclude(
         observed, found, mapped=evidence.flow is not None, state=evidence.state, limits=limits

@@ -7,7 +7,7 @@ import pytest
 
 from models.assessment.assess import begin_at
 from models.pose import warm_start_from_bytes
-from service.estimation.compute import begin_of, compute_estimate
+from service.estimation.compute import basis_of, begin_of, compute_estimate
 from service.estimation.evidence import load_evidence
 from service.store.references import LastPoseRecord
 from tests.service.street import KNOCKED, PRIOR, known_street
@@ -16,6 +16,10 @@ from tests.service.street import KNOCKED, PRIOR, known_street
 def evidence_of(street):
     with street.context.store.read() as session:
         return load_evidence(session, street.context.settings, "corner")
+
+
+def begin(evidence):
+    return begin_of(evidence, basis_of(evidence))
 
 
 @pytest.fixture
@@ -45,18 +49,18 @@ def test_a_site_that_is_new_or_suspected_begins_anew(known):
     known.walk(PRIOR, 5)
     evidence = evidence_of(known)
     kept = evidence.last
-    begin = begin_of(evidence)
-    assert begin is not None
-    assert begin_at(begin, suspicious=False, drifts_slowly=False) is begin
-    assert begin_at(begin, suspicious=True, drifts_slowly=False) is None
-    assert begin_at(begin, suspicious=False, drifts_slowly=True) is None
+    at = begin(evidence)
+    assert at is not None
+    assert begin_at(at, suspicious=False, drifts_slowly=False) is at
+    assert begin_at(at, suspicious=True, drifts_slowly=False) is None
+    assert begin_at(at, suspicious=False, drifts_slowly=True) is None
     assert begin_at(None, suspicious=False, drifts_slowly=False) is None
-    assert begin_of(replace(evidence, last=None)) is None
-    assert begin_of(replace(evidence, flow=b"grown")) is None
-    assert begin_of(replace(evidence, reference_id=7)) is None
-    assert begin_of(replace(evidence, prior=replace(PRIOR, height_m=7.0))) is None
+    assert begin(replace(evidence, last=None)) is None
+    assert begin(replace(evidence, flow=b"grown")) is None
+    assert begin(replace(evidence, reference_id=7)) is None
+    assert begin(replace(evidence, prior=replace(PRIOR, height_m=7.0))) is None
     other_release = LastPoseRecord(basis=kept.basis, data=b"else")
-    assert begin_of(replace(evidence, last=other_release)) is None
+    assert begin(replace(evidence, last=other_release)) is None
 
 
 def test_a_changed_camera_begins_anew(known):

@@ -11,7 +11,7 @@ import surefoot
 from models.assessment import tracks_a_year
 from models.simulation.poses import PoseOffset
 from models.tracks.scenes import load_scene
-from service.estimation.compute import compute_estimate, limits_of, site_of
+from service.estimation.compute import compute_estimate, site_of
 from service.estimation.evidence import load_evidence
 from service.job_queue import JobQueue
 from service.store.engines.store import Store
@@ -107,7 +107,8 @@ def test_same_tracks_get_same_assessment(evidence_of, folder, knock):
     if evidence is None or evidence.site is None:
         pytest.skip("too few people for a reference")
     tracks = [each.trajectory for each in evidence.tracks]
-    evidence = replace(evidence, tracks_a_year=tracks_a_year(tracks), last=None)
+    limits = replace(evidence.limits, tracks_a_year=tracks_a_year(tracks))
+    evidence = replace(evidence, limits=limits, last=None)
     by_service = compute_estimate(evidence, 0)
     site = site_of(evidence, [])
     camera = surefoot.Camera(
@@ -122,7 +123,7 @@ def test_same_tracks_get_same_assessment(evidence_of, folder, knock):
     assert not evidence.state.alerted
     by_api = surefoot.estimate(Site(camera=camera, model=site), tracks)
     whole = Window(batch=None, tracks=len(tracks), days=1e4)
-    (by_study,) = assessed_windows(tracks, site, whole, limits_of(evidence))
+    (by_study,) = assessed_windows(tracks, site, whole, evidence.limits)
 
     assert numbers(by_study.assessment.estimated) == numbers(served.estimated)
     assert by_study.assessment.chart == served.chart
