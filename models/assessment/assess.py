@@ -42,7 +42,7 @@ from models.pose.site import CameraSite, assume_site
 from models.reasons import Reason
 from models.walking.config import FEWEST_WALKERS
 
-MAP = "flow_map"  # the part whose failure leaves a site without its map of paths
+MAP = "flow_map"  # if this part fails, the site has no map of paths
 _LATER = 0.25  # of the tracks: so many may have come after a momentary factor that still counts
 _USUAL_LIMITS = AssessmentLimits()
 
@@ -69,8 +69,8 @@ class Monitored:
     """Results of the first two stages: measurements, the drift chart and the slow drift.
 
     `site` is the one to estimate by: with the first map of paths if the camera drifts slowly.
-    `mapped` is whether it has a map at all. `scores` are those that the chart was made of; None
-    without a chart.
+    `mapped` is whether it has a map of paths. The chart was made of `scores`; None without a
+    chart.
     """
 
     observed: Observed

@@ -86,7 +86,7 @@ def state_of(
     """The state of a camera: the first rule that holds, else `learning`.
 
     An image decides alone whether the camera moved. Before enough people came since an operator's
-    answer, that answer holds. Paths that nobody walked stay so until people are seen there again.
+    answer, that answer holds. Unused paths count as unused until people are seen there again.
     """
     moved = posterior.moved >= LIKELY
     seen_again = enough and (fused.registered or not mapped)

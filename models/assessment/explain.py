@@ -21,7 +21,7 @@ def explain(
     limits: AssessmentLimits,
     by_factors: tuple[Reason, ...] = (),
 ) -> tuple[Reason, ...]:
-    """Give the reasons of a decision. `by_factors` are those of the factors that count."""
+    """Give the reasons of a decision. `by_factors` come from the factors that count."""
     fused, verdict = found.fused, decision.verdict
     otherwise = is_site_changed(found.posterior, fused) and not verdict.drifting
     # An alarm about times has the chart's reason, which comes below.

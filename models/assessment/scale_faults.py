@@ -65,7 +65,7 @@ def clock_fault(
 
     Times that are too long by a factor make people slow, and only a higher camera makes them walk
     as before: the height grows by that factor and nothing else does. A camera that was raised
-    without turning looks the same; one that may have turned has a clock that is right.
+    without turning looks the same. If the camera may have turned, the clock is not the cause.
 
     `turned` is the probability that an angle changed, given a move. Without a `frame_rate_hz` it
     is 25.

@@ -1,4 +1,4 @@
-"""Values that go into an assessment and come out of it.
+"""Input and output values of an assessment.
 
 Times are seconds since the Unix epoch, angles are radians. Arrays of N entries are by track, in the
 order of the tracks' ends.
@@ -65,7 +65,7 @@ class TrackWindow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnlearnedSite:
-    """A camera at its prior pose whose people are not known yet: a walking speed is assumed."""
+    """A camera at its prior pose before its people are known: a walking speed is assumed."""
 
     intrinsics: Intrinsics
     prior: CameraPose
@@ -93,8 +93,8 @@ class AssessmentState:
     """What one assessment leaves to the next, with the operators' answers since.
 
     `drifted` names the parameters beyond their limits since the drift began, `moved_at` is the
-    time of that move. `alerted` and `unsure` are whether an alert reports a move, or paths on which
-    nobody walks. `false_alarm` is whether the operator's last answer was one. `change` is the
+    time of that move. `alerted` and `unsure` are whether an alert reports a move, or unused
+    paths. `false_alarm` is whether the operator's last answer was "false alarm". `change` is the
     newest change point of the reference. The camera is known to be stationary until
     `stationary_until_s`; the window of the last assessment ended at `assessed_until_s`. `doubts`
     are about the reference. `warm_start` is where the search may begin.
@@ -160,7 +160,7 @@ NO_VERDICT = Verdict()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What the evidence comes to.
+    """The conclusion from the evidence.
 
     `cause` is the reason of a wrong clock or another lens, which explain the tracks instead of a
     move. `moved_at` is the time of the move, as far as it is known.

@@ -64,7 +64,7 @@ def judge(
 def may_be_alerted(
     moved: float, limits: DriftLimits, slow_drift: SlowDrift | None, *, alerted: bool
 ) -> bool:
-    """False if `judge` cannot find a drift, whatever else it is given; `alerted` of one before."""
+    """False if `judge` cannot find a drift. `alerted` is whether an alert is open already."""
     crept = slow_drift is not None and slow_drift.moved
     return alerted or crept or moved >= min(config.BORNE_OUT, limits.certainty)
 

@@ -1,7 +1,7 @@
-"""Checks of a registered lens: what no camera can have, and what is more likely a mistake.
+"""Checks of a registered lens: errors that no camera can have, and likely mistakes.
 
 Lenses are checked where a person or a program gives them, not in `Intrinsics`: estimators try
-lenses that nobody would register.
+lenses that are never registered.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _USUAL_ASPECT, _MOST_ASPECT = 1.5, 5.0
 _LEAST_REACH = {Projection.PERSPECTIVE: 1.0, Projection.FISHEYE: 0.5}
 _MOST_WITHOUT_RAY = 0.2  # share of the image of a perspective lens; published wide ones to 0.17
 _USUAL_TANGENTIAL = 0.05  # of p1 and p2: published ones are below 0.02, k3 is often above 0.05
-_SIDES = 8  # pixels, of which the sides of usual streams are multiples
+_SIDES = 8  # pixels: the sides of usual streams are multiples
 _GRID = 41  # pixels a side
 
 
@@ -128,7 +128,7 @@ def _off_centre(cx: float, cy: float, width: float, height: float) -> tuple[floa
 
 
 def _other_size(lens: Intrinsics) -> tuple[int, int]:
-    """The image size (width, height) whose middle the principal point is; 0, 0 if it is none.
+    """The image size (width, height) with its centre at the principal point; 0, 0 if none fits.
 
     A lens that is cropped off the middle is not off by the same factor in x and in y.
     """

@@ -134,9 +134,9 @@ def chart_result(
 ) -> ChartResult | None:
     """Chart result of the present; None of fewer than 16 walking groups.
 
-    `scores` are of walking groups in the order of their ends, of which 1000 may cause
+    `scores` are of walking groups in the order of their ends: 1000 groups may cause
     `alarms_a_run` false alarms. The chart is calm if it is below `calm_ratio` of its level for
-    `calm_groups` in a row. `ratios` are those of the chart, if they are at hand.
+    `calm_groups` in a row. `ratios` are the ratios of the chart, if they are at hand.
     """
     if len(scores.values) < config.FEWEST_GROUPS:
         return None

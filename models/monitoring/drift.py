@@ -32,9 +32,9 @@ class MoveProbabilities:
 class Drift:
     """Pose minus prior pose: `by` how much, and its standard deviations.
 
-    `identifiable` names the parameters that the tracks determine; the others stand here but count
-    nowhere. `angle_rad` is the whole rotation that the identifiable angles make. `move` is how
-    likely one is.
+    `identifiable` names the parameters that the tracks determine; the others are not used.
+    `angle_rad` is the whole rotation that the identifiable angles make. `move` is how likely one
+    is.
     """
 
     by: PoseParameters
@@ -54,8 +54,8 @@ class Drift:
     def ratios(self, limits: "DriftLimits") -> dict[str, float]:
         """The drift of each identifiable parameter in units of its floor.
 
-        The floor of an angle is one of the whole turn: 0.8 deg in each of three angles are 1.3 deg.
-        The largest of the angles counts for all of them.
+        The floor of an angle applies to the whole turn: 0.8 deg in each of three angles are
+        1.3 deg. The largest angle counts for all three.
         """
         found = {name: self.ratio(name, limits) for name in self.identifiable}
         angles = [name for name in ANGLES if name in found]

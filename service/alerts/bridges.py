@@ -1,4 +1,4 @@
-"""What is wrong with a bridge, and the alert `stale` about the cameras that it feeds."""
+"""Problems of a bridge, and the alert `stale` about the cameras that it feeds."""
 
 import logging
 import time
@@ -26,7 +26,7 @@ _ANSWERED = timedelta(hours=1)  # no new alert for so long after a person has en
 
 
 def problem_of(record: BridgeRecord, now: datetime) -> Reason | None:
-    """What is wrong with a bridge; None if it works, or was stopped on purpose.
+    """The problem of a bridge; None if it works, or was stopped on purpose.
 
     `now` is the database's.
     """

@@ -1,4 +1,4 @@
-"""The alert `stale` of cameras whose estimate is not being made, or skips some of its tracks."""
+"""The alert `stale` of cameras without new estimates, or with skipped tracks."""
 
 import time
 from datetime import UTC, datetime, timedelta
@@ -32,7 +32,7 @@ class StaleWatch:
         self._bridges = BridgeWatch()
 
     def watch(self, session: Session, settings: Settings) -> dict[str, str]:
-        """Bring all alerts `stale` up to date; return the cameras whose alert opened or ended."""
+        """Bring all alerts `stale` up to date; return the cameras with a new or ended one."""
         now_s = time.monotonic()
         firing = alerts.firing_codes(session, AlertKind.STALE)
         unseen = tracks.unseen_since(session)

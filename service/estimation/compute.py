@@ -51,7 +51,7 @@ from service.store.windows import PredictionRecord
 class ComputedEstimate:
     """An assessment, and what the service adds to it.
 
-    `tracks` are those that the pose is estimated by. `averaged` is the regressor's estimate,
+    The pose is estimated by `tracks`. `averaged` is the regressor's estimate,
     `zones` the consequence of a move for zones, `last` where the next search may begin.
     """
 
@@ -81,7 +81,7 @@ def compute_estimate(
 
     None if fewer than five people walk.
 
-    `failures` are those of the run so far; those of the assessment join them.
+    `failures` are those of the run so far; the failures of the assessment join them.
     """
     failures = failures or PartialFailures(evidence.camera_id)
     failed: list[PartialFailure] = []
@@ -210,7 +210,7 @@ def _kept(evidence: Evidence, basis: bytes, found: WarmStart) -> LastPoseRecord:
 
 
 def _may_be_alerted(evidence: Evidence, found: Assessment) -> bool:
-    """True if an alert may report zones: those of a stationary camera interest nobody."""
+    """True if an alert may report zones: zones of a stationary camera are never reported."""
     return may_be_alerted(
         found.posterior.moved,
         evidence.limits.drift,

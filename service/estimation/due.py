@@ -28,7 +28,7 @@ class Circumstances:
     """The input of the decision whether a run is a full one.
 
     `asked`: a page or an operator asks for an estimate. `learned`: the reference is known.
-    `alerted` and `unsure` are open alerts, `tracks` those of the window. `suspicious` and
+    `alerted` and `unsure` are open alerts, `tracks` the number in the window. `suspicious` and
     `drifts_slowly` are results of the monitor.
     """
 
@@ -45,9 +45,9 @@ class Circumstances:
 def is_full_estimate_due(run: Circumstances) -> bool:
     """True if a full estimate can change something.
 
-    It can if somebody asks for it, an operator acted, an image or a model is new, a tenth of the
-    window is new, the camera may have moved, or the chart or the probability of a move is above its
-    watch level.
+    It can if a page or an operator asks for it, an operator acted, an image or a model is new, a
+    tenth of the window is new, the camera may have moved, or the chart or the probability of a move
+    is above its watch level.
     """
     last = run.previous
     if run.asked or not run.learned or last is None or last.has_new_input:

@@ -1,4 +1,4 @@
-"""What is wrong with a body, in our words: the field, its limit and the value received."""
+"""Errors of a body in plain words: the field, its limit and the value received."""
 
 import re
 import reprlib
